@@ -1,0 +1,307 @@
+"""Least-squares fit of the semi-fundamental patch by a NURBS surface: the paper's eqs. (11) to (13).
+
+Points and unit normals are fitted in one basis, so that the faces of a wall of thickness t are the
+control nets ``P +- t/2 N``. In the smooth parameterisation the corners are interpolated, then each edge
+is fitted from its own samples alone, then the interior: an edge's control points depend on nothing but
+the edge, so two patches that meet there get the same ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import FitError, ParameterError
+from gyroid_cad.nurbs import NurbsSurface, basis, edge_row, gauss_points, uniform_knots
+from gyroid_cad.patch import (
+    EDGE_HALF_TURN,
+    EDGE_HALF_TURN_SHIFT,
+    PARAMETERISATIONS,
+    ROTOINVERSION,
+    parameter_corners,
+)
+
+__all__ = ["FitReport", "FitSettings", "FittedPatch", "edge_gap", "fit_patch", "fit_report", "require_shared_edges"]
+
+Floats = NDArray[np.float64]
+
+DEGREE = 3
+FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS = 4, 40
+# Edges further apart than this, in units of the cell size, are not one edge: rounding leaves 1e-15.
+EDGE_GAP_LIMIT = 1e-12
+_SAMPLES_PER_SPAN = 4
+_CLOUD_RADII = 48
+_MOST_REPORT_SAMPLES = 121
+# Lengths here are in bounding-cell lengths a; reports are in cell sizes L = 2 a.
+_CELL_SIZE = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class FitSettings:
+    """How the patch is fitted.
+
+    Attributes
+    ----------
+    control_points : int
+        Along each side, 4 to 40.
+    knots : tuple of float, optional
+        Clamped on [-1, 1], symmetric about 0, control_points + 4 long; evenly spaced if left out.
+    weights : tuple of tuples of float, optional
+        Positive, control_points x control_points; all 1 if left out.
+    parameterisation : {"smooth", "polar"}
+        "polar" is the paper's: its cloud of points has no edges of its own, so it is fitted all at once.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    control_points: int = 10
+    knots: tuple[float, ...] | None = None
+    weights: tuple[tuple[float, ...], ...] | None = None
+    parameterisation: str = "smooth"
+
+    def __post_init__(self) -> None:
+        n = self.control_points
+        if isinstance(n, bool) or not isinstance(n, int | np.integer):
+            raise ParameterError("control_points", n, "a whole number")
+        if not FEWEST_CONTROL_POINTS <= n <= MOST_CONTROL_POINTS:
+            raise ParameterError("control_points", n, f"{FEWEST_CONTROL_POINTS} to {MOST_CONTROL_POINTS} a side")
+        if self.parameterisation not in PARAMETERISATIONS:
+            raise ParameterError("parameterisation", self.parameterisation, " or ".join(PARAMETERISATIONS))
+        if self.knots is not None:
+            object.__setattr__(self, "knots", _validated_knots(self.knots, n))
+        if self.weights is not None:
+            object.__setattr__(self, "weights", _validated_weights(self.weights, n))
+
+    @classmethod
+    def paper(cls) -> Self:
+        """The paper's fit: its polar cloud, the knots of eq. (14), the weights of Fig. 7."""
+        inner = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)
+        weights = np.ones((10, 10))
+        weights[3:7, 3:7] = 3 / 2
+        weights[4:6, 4:6] = 3 / 4
+        weights[np.ix_([0, -1], [0, -1])] = 1 / 4
+        rows = tuple(tuple(row) for row in weights.tolist())
+        return cls(10, (-1.0,) * 4 + inner + (1.0,) * 4, rows, "polar")
+
+    def knot_vector(self) -> Floats:
+        """The knots, evenly spaced where none were given; shape (control_points + 4,)."""
+        return uniform_knots(self.control_points, DEGREE) if self.knots is None else np.array(self.knots)
+
+    def weight_net(self) -> Floats:
+        """The weights, 1 where none were given; shape (control_points, control_points)."""
+        return np.ones((self.control_points,) * 2) if self.weights is None else np.array(self.weights)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedPatch:
+    """The fitted mid-surface and, in the same basis, its fitted unit normals.
+
+    Attributes
+    ----------
+    settings : FitSettings
+    surface : NurbsSurface
+        In units of the bounding-cell length, centred at the origin.
+    normals : NurbsSurface
+        Same knots and weights; its "points" are unit vectors on the side of dS/du x dS/dv.
+    """
+
+    settings: FitSettings
+    surface: NurbsSurface
+    normals: NurbsSurface
+
+    def offset(self, distance: float) -> NurbsSurface:
+        """The parallel surface at ``distance`` along the normal: the control net P + distance N."""
+        net = self.surface.control_points + distance * self.normals.control_points
+        return NurbsSurface(net, self.surface.weights, self.surface.knots_u, self.surface.knots_v)
+
+
+@dataclass(frozen=True, slots=True)
+class FitReport:
+    """What a fit is worth; lengths in units of the cell size L, angles in degrees, curvature in 1/L."""
+
+    max_distance: float
+    rms_distance: float
+    max_normal_angle: float
+    max_mean_curvature: float
+    rms_mean_curvature: float
+    edge_gap: float
+    corner_error: float
+
+
+@lru_cache(maxsize=32)
+def fit_patch(settings: FitSettings = FitSettings()) -> FittedPatch:  # noqa: B008
+    """Fit the gyroid's semi-fundamental patch.
+
+    Parameters
+    ----------
+    settings : FitSettings
+
+    Returns
+    -------
+    FittedPatch
+    """
+    fit = _fit_cloud if settings.parameterisation == "polar" else _fit_staged
+    net = fit(settings)
+    knots, weights = settings.knot_vector(), settings.weight_net()
+    surface, normals = (NurbsSurface(net[..., part], weights, knots, knots) for part in (slice(3), slice(3, 6)))
+    return FittedPatch(settings, surface, normals)
+
+
+@lru_cache(maxsize=32)
+def fit_report(fitted: FittedPatch) -> FitReport:
+    """Measure a fit against the exact surface on a dense grid.
+
+    Distance is measured along the exact normal through the exact point, to where that line meets the
+    fitted surface (Newton's method); the angle is that between the two normals there.
+    """
+    n = fitted.settings.control_points
+    samples = np.linspace(-1, 1, min(12 * (n - DEGREE) + 1, _MOST_REPORT_SAMPLES))
+    u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
+    exact = PARAMETERISATIONS[fitted.settings.parameterisation]
+    points, normals = exact(u, v)
+    distance = np.zeros(len(u))
+    foot_u, foot_v = u.copy(), v.copy()
+    for _ in range(4):
+        d = fitted.surface.derivatives(foot_u, foot_v)
+        residual = points + distance[:, np.newaxis] * normals - d[0, 0]
+        jacobian = np.stack([d[1, 0], d[0, 1], -normals], axis=-1)
+        step = np.linalg.solve(jacobian, residual[..., np.newaxis])[..., 0]
+        foot_u, foot_v, distance = foot_u + step[:, 0], foot_v + step[:, 1], distance + step[:, 2]
+    sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
+    curvature = fitted.surface.mean_curvature(u, v) * _CELL_SIZE
+    at_corners = fitted.surface.evaluate(*parameter_corners().T)
+    return FitReport(
+        max_distance=float(np.max(np.abs(distance))) / _CELL_SIZE,
+        rms_distance=float(np.sqrt(np.mean(distance**2))) / _CELL_SIZE,
+        max_normal_angle=float(np.degrees(np.arcsin(np.max(sine)))),
+        max_mean_curvature=float(np.max(np.abs(curvature))),
+        rms_mean_curvature=float(np.sqrt(np.mean(curvature**2))),
+        edge_gap=edge_gap(fitted),
+        corner_error=float(np.max(np.linalg.norm(at_corners - exact(*parameter_corners().T)[0], axis=1)) / _CELL_SIZE),
+    )
+
+
+def edge_gap(fitted: FittedPatch) -> float:
+    """Largest distance, in cell sizes, between an edge of the fit and the same edge of its neighbour.
+
+    The neighbour is the patch's image under the half-turn about the normal at the edge's midpoint,
+    which runs the edge backwards.
+    """
+    along = np.linspace(-1, 1, 201)
+    gaps = []
+    for k in range(4):
+        to_edge_3 = np.linalg.matrix_power(ROTOINVERSION, 3 - k)
+        edge = fitted.surface.edge(k).evaluate(along) @ to_edge_3.T
+        neighbours = edge[::-1] @ EDGE_HALF_TURN.T + EDGE_HALF_TURN_SHIFT
+        gaps.append(np.max(np.linalg.norm(edge - neighbours, axis=1)))
+    return float(max(gaps)) / _CELL_SIZE
+
+
+def require_shared_edges(fitted: FittedPatch) -> None:
+    """Refuse a fit whose neighbouring patches do not meet.
+
+    Raises
+    ------
+    FitError
+        Saying how far apart the edges are.
+    """
+    gap = edge_gap(fitted)
+    if gap > EDGE_GAP_LIMIT:
+        raise FitError(
+            f"the edges of neighbouring patches are {gap:.2e} of the cell size apart in the "
+            f"{fitted.settings.parameterisation} parameterisation; a solid needs them within {EDGE_GAP_LIMIT:.0e}: "
+            "use the smooth one, with symmetric weights"
+        )
+
+
+def _fit_staged(settings: FitSettings) -> Floats:
+    """Corners, then edges, then interior; returns the net of (point, normal), shape (n, n, 6)."""
+    n, knots, weights = settings.control_points, settings.knot_vector(), settings.weight_net()
+    exact = PARAMETERISATIONS[settings.parameterisation]
+    samples, sample_weights = gauss_points(knots, _SAMPLES_PER_SPAN)
+    functions = basis(knots, DEGREE, samples)
+    net = np.zeros((n, n, 6))
+    for k, (u, v) in enumerate(parameter_corners()):
+        edge_row(net, k)[0] = np.concatenate(exact(u, v), axis=-1)
+    square = {0: (samples, -1.0), 1: (1.0, samples), 2: (-samples, 1.0), 3: (-1.0, -samples)}
+    for k, (u, v) in square.items():
+        rational = functions * edge_row(weights, k)
+        rational /= rational.sum(axis=1, keepdims=True)
+        row = edge_row(net, k)
+        known = rational[:, [0, -1]] @ row[[0, -1]]
+        row[1:-1] = _least_squares(rational[:, 1:-1], np.concatenate(exact(u, v), axis=-1) - known, sample_weights)
+    u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
+    rational = _rational_rows(functions, functions, weights)
+    inner = np.zeros((n, n), dtype=bool)
+    inner[1:-1, 1:-1] = True
+    known = rational[:, ~inner.ravel()] @ net[~inner]
+    wanted = np.concatenate(exact(u, v), axis=-1) - known
+    net[inner] = _least_squares(rational[:, inner.ravel()], wanted, np.outer(sample_weights, sample_weights).ravel())
+    return net
+
+
+def _fit_cloud(settings: FitSettings) -> Floats:
+    """All control points at once, from a cloud even in radius and angle (Fig. 5); shape (n, n, 6)."""
+    n, knots = settings.control_points, settings.knot_vector()
+    radius = np.arange(1, _CLOUD_RADII + 1) / _CLOUD_RADII
+    along = np.linspace(-1, 1, _CLOUD_RADII, endpoint=False)
+    ones = np.ones_like(along)
+    border_u = np.concatenate([along, ones, -along, -ones])
+    border_v = np.concatenate([-ones, along, ones, -along])
+    u = np.append(np.outer(radius, border_u).ravel(), 0.0)
+    v = np.append(np.outer(radius, border_v).ravel(), 0.0)
+    products = basis(knots, DEGREE, u)[:, :, np.newaxis] * basis(knots, DEGREE, v)[:, np.newaxis, :]
+    rational = (products * settings.weight_net()).reshape(len(u), n * n)
+    rational /= rational.sum(axis=1, keepdims=True)
+    samples = np.concatenate(PARAMETERISATIONS[settings.parameterisation](u, v), axis=-1)
+    return _least_squares(rational, samples, np.ones(len(u))).reshape(n, n, 6)
+
+
+def _rational_rows(along_u: Floats, along_v: Floats, weights: Floats) -> Floats:
+    """R of eq. (11) on a grid of samples, by eq. (9); shape (len(u) * len(v), n * n)."""
+    rows = np.einsum("ai,bj,ij->abij", along_u, along_v, weights).reshape(len(along_u) * len(along_v), -1)
+    return np.asarray(rows / rows.sum(axis=1, keepdims=True))
+
+
+def _least_squares(rows: Floats, wanted: Floats, sample_weights: Floats) -> Floats:
+    """Eqs. (12), (13), with one weight a sample: (R^T W R)^-1 R^T W S."""
+    weighted = rows.T * sample_weights
+    return np.linalg.solve(weighted @ rows, weighted @ wanted)
+
+
+def _validated_knots(knots: tuple[float, ...], control_points: int) -> tuple[float, ...]:
+    accepted = (
+        f"{control_points + DEGREE + 1} non-decreasing numbers, four times -1, four times 1 "
+        "and between them distinct ones symmetric about 0"
+    )
+    try:
+        vector = np.array(knots, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError("knots", knots, accepted) from None
+    good = (
+        vector.shape == (control_points + DEGREE + 1,)
+        and np.all(vector[:4] == -1)
+        and np.all(vector[-4:] == 1)
+        and np.all(np.diff(vector[3:-3]) > 0)
+        and np.allclose(vector, -vector[::-1], rtol=0, atol=1e-12)
+    )
+    if not good:
+        raise ParameterError("knots", knots, accepted)
+    return tuple(vector.tolist())
+
+
+def _validated_weights(weights: tuple[tuple[float, ...], ...], control_points: int) -> tuple[tuple[float, ...], ...]:
+    accepted = f"{control_points} x {control_points} positive numbers"
+    try:
+        net = np.array(weights, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError("weights", weights, accepted) from None
+    if net.shape != (control_points, control_points) or not np.all(np.isfinite(net) & (net > 0)):
+        raise ParameterError("weights", weights, accepted)
+    return tuple(tuple(row) for row in net.tolist())

@@ -1,0 +1,247 @@
+"""The wall as a closed solid, every vertex and edge made once and shared by the complex's ids.
+
+Nothing is sewn: ``BRep_Builder`` puts together what the complex already knows to be together. Geometry is
+shared as well, between patches that differ by a translation; the translation is the location of the
+curve or surface inside the edge or face.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
+from OCP.Geom2d import Geom2d_Line
+from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import (
+    TopoDS_Compound,
+    TopoDS_Edge,
+    TopoDS_Face,
+    TopoDS_Shape,
+    TopoDS_Shell,
+    TopoDS_Solid,
+    TopoDS_Vertex,
+    TopoDS_Wire,
+)
+
+from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface
+from gyroid_cad.nurbs import NurbsCurve
+from gyroid_cad.wall import SIDES, Wall
+
+__all__ = ["TOLERANCE", "realise"]
+
+# The kernel's own smallest distance (Precision::Confusion): shared edges agree to rounding.
+TOLERANCE = 1e-7
+# Where the patch's corners are in its control net.
+_CORNER_INDEX = ((0, 0), (-1, 0), (-1, -1), (0, -1))
+
+
+def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
+    """Build the closed solid round a wall.
+
+    Parameters
+    ----------
+    wall : Wall
+    progress : callable, optional
+        Called now and then with (patches done, patches in all).
+
+    Returns
+    -------
+    TopoDS_Solid
+        Or a TopoDS_Compound of solids where the lattice falls into pieces that share no edge.
+    """
+    return _Realisation(wall).build(progress or (lambda done, total: None))
+
+
+class _Realisation:
+    """The shapes made so far, by the complex's ids."""
+
+    def __init__(self, wall: Wall) -> None:
+        self.wall = wall
+        self.complex = wall.complex
+        self.builder = BRep_Builder()
+        self.identity = TopLoc_Location()
+        # One location object a translation: the kernel compares locations by how they were made.
+        self.locations = [_translation(shift) for shift in wall.shifts.tolist()]
+        self.face_surfaces: dict[tuple[int, int], Geom_BSplineSurface] = {}
+        self.ruled_surfaces: dict[tuple[int, int], Geom_BSplineSurface] = {}
+        self.curves: dict[tuple[int, int, int], Geom_BSplineCurve] = {}
+        self.patch_net = wall.patch_net.tolist()
+        self.patch_shift = wall.patch_shift.tolist()
+        self.patch_edges = self.complex.patch_edges.tolist()
+        self.patch_fans = self.complex.patch_fans.tolist()
+        self.edge_forward = self.complex.edge_forward.tolist()
+        self.border = _border_lines()
+        self.rim_lines = [(_line(0, height, -1, 0), _line(0, height, 1, 0)) for height in (0, 1)]
+        self.post_lines = [_line(u, 0, 0, 1) for u in (-1, 1)]
+
+    def build(self, progress: Callable[[int, int], None]) -> TopoDS_Shape:
+        self.vertices = self._make_vertices()
+        self.edges = self._make_edges()
+        self.posts = self._make_posts()
+        shells = [self._new_shell() for _ in range(self.complex.component_count)]
+        free = self.complex.free.tolist()
+        component = self.complex.patch_component.tolist()
+        for patch in range(self.complex.patch_count):
+            shell = shells[component[patch]]
+            self.builder.Add(shell, self._make_face(patch, 0).Oriented(TopAbs_REVERSED))
+            self.builder.Add(shell, self._make_face(patch, 1))
+            for k in range(4):
+                if free[self.patch_edges[patch][k]]:
+                    self.builder.Add(shell, self._make_side_wall(patch, k))
+            if patch % 240 == 0:
+                progress(patch, self.complex.patch_count)
+        progress(self.complex.patch_count, self.complex.patch_count)
+        return self._solids(shells)
+
+    def _new_shell(self) -> TopoDS_Shell:
+        shell = TopoDS_Shell()
+        self.builder.MakeShell(shell)
+        return shell
+
+    def _solids(self, shells: list[TopoDS_Shell]) -> TopoDS_Shape:
+        solids = []
+        for shell in shells:
+            shell.Closed(True)
+            solid = TopoDS_Solid()
+            self.builder.MakeSolid(solid)
+            self.builder.Add(solid, shell)
+            solids.append(solid)
+        if len(solids) == 1:
+            return solids[0]
+        compound = TopoDS_Compound()
+        self.builder.MakeCompound(compound)
+        for solid in solids:
+            self.builder.Add(compound, solid)
+        return compound
+
+    def _make_vertices(self) -> list[list[TopoDS_Vertex]]:
+        """Two vertices a fan, one on each side of the wall; [side][fan]."""
+        patches, corners = self.complex.patch_fans.shape
+        first = np.zeros(self.complex.fan_count, dtype=np.int64)
+        first[self.complex.patch_fans.ravel()] = np.arange(patches * corners)
+        patch, corner = np.divmod(first, corners)
+        net, shift = self.wall.patch_net[patch], self.wall.shifts[self.wall.patch_shift[patch]]
+        vertices: list[list[TopoDS_Vertex]] = []
+        for side in SIDES:
+            corner_points = np.stack([self.wall.nets[:, side][(slice(None), *_CORNER_INDEX[k])] for k in range(corners)], axis=1)
+            made = []
+            for point in (corner_points[net, corner] + shift).tolist():
+                vertex = TopoDS_Vertex()
+                self.builder.MakeVertex(vertex, gp_Pnt(*point), TOLERANCE)
+                made.append(vertex)
+            vertices.append(made)
+        return vertices
+
+    def _make_edges(self) -> list[list[TopoDS_Edge]]:
+        """Two rims an edge of the complex, one on each side of the wall; [side][edge]."""
+        owner = self.complex.edge_patches[:, 0].tolist()
+        fans = self.complex.edge_fans.tolist()
+        edges: list[list[TopoDS_Edge]] = []
+        for side in SIDES:
+            made = []
+            for index, patch in enumerate(owner):
+                k = self.patch_edges[patch].index(index)
+                curve = self._curve(patch, k, side)
+                edge = TopoDS_Edge()
+                self.builder.MakeEdge(edge, curve, self.locations[self.patch_shift[patch]], TOLERANCE)
+                start, end = fans[index]
+                self._bound(edge, self.vertices[side][start], self.vertices[side][end], -1.0, 1.0)
+                made.append(edge)
+            edges.append(made)
+        return edges
+
+    def _make_posts(self) -> dict[int, TopoDS_Edge]:
+        """A straight edge through the wall for each fan that does not close round its corner."""
+        posts = {}
+        for fan in np.flatnonzero(self.complex.border_fans).tolist():
+            below, above = (self.vertices[side][fan] for side in SIDES)
+            ends = np.array([_position(below), _position(above)])
+            line = kernel_curve(NurbsCurve(ends, np.ones(2), np.array([0.0, 0.0, 1.0, 1.0])))
+            edge = TopoDS_Edge()
+            self.builder.MakeEdge(edge, line, self.identity, TOLERANCE)
+            self._bound(edge, below, above, 0.0, 1.0)
+            posts[fan] = edge
+        return posts
+
+    def _bound(self, edge: TopoDS_Edge, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: float) -> None:
+        self.builder.Add(edge, start)
+        self.builder.Add(edge, end.Oriented(TopAbs_REVERSED))
+        self.builder.Range(edge, first, last)
+
+    def _curve(self, patch: int, k: int, side: int) -> Geom_BSplineCurve:
+        key = (self.patch_net[patch] * 4 + k, side, self.edge_forward[patch][k])
+        if key not in self.curves:
+            curve = self.wall.face(self.patch_net[patch], side).edge(k)
+            self.curves[key] = kernel_curve(curve if self.edge_forward[patch][k] else curve.reversed())
+        return self.curves[key]
+
+    def _make_face(self, patch: int, side: int) -> TopoDS_Face:
+        key = (self.patch_net[patch], side)
+        if key not in self.face_surfaces:
+            self.face_surfaces[key] = kernel_surface(self.wall.face(*key))
+        surface, location = self.face_surfaces[key], self.locations[self.patch_shift[patch]]
+        face, wire = TopoDS_Face(), TopoDS_Wire()
+        self.builder.MakeFace(face, surface, location, TOLERANCE)
+        self.builder.MakeWire(wire)
+        for k, index in enumerate(self.patch_edges[patch]):
+            edge = self.edges[side][index]
+            forward = self.edge_forward[patch][k]
+            self.builder.UpdateEdge(edge, self.border[k][forward], surface, location, TOLERANCE)
+            self.builder.Add(wire, edge if forward else edge.Reversed())
+        return self._closed(face, wire)
+
+    def _make_side_wall(self, patch: int, k: int) -> TopoDS_Face:
+        key = (self.patch_net[patch], k)
+        if key not in self.ruled_surfaces:
+            self.ruled_surfaces[key] = kernel_surface(self.wall.side_wall(*key))
+        surface, location = self.ruled_surfaces[key], self.locations[self.patch_shift[patch]]
+        face, wire = TopoDS_Face(), TopoDS_Wire()
+        self.builder.MakeFace(face, surface, location, TOLERANCE)
+        self.builder.MakeWire(wire)
+        index, forward = self.patch_edges[patch][k], self.edge_forward[patch][k]
+        start, end = self.patch_fans[patch][k], self.patch_fans[patch][(k + 1) % 4]
+        bottom, top = self.edges[0][index], self.edges[1][index]
+        left, right = self.posts[start], self.posts[end]
+        for rim, height in ((bottom, 0), (top, 1)):
+            self.builder.UpdateEdge(rim, self.rim_lines[height][forward], surface, location, TOLERANCE)
+        for post, line in ((left, self.post_lines[0]), (right, self.post_lines[1])):
+            self.builder.UpdateEdge(post, line, surface, location, TOLERANCE)
+        self.builder.Add(wire, bottom if forward else bottom.Reversed())
+        self.builder.Add(wire, right)
+        self.builder.Add(wire, top.Reversed() if forward else top)
+        self.builder.Add(wire, left.Reversed())
+        return self._closed(face, wire)
+
+    def _closed(self, face: TopoDS_Face, wire: TopoDS_Wire) -> TopoDS_Face:
+        wire.Closed(True)
+        self.builder.Add(face, wire)
+        self.builder.NaturalRestriction(face, True)
+        return face
+
+
+def _border_lines() -> list[tuple[Geom2d_Line, Geom2d_Line]]:
+    """The square's four sides in the parameter plane, for edges that run against and along the patch."""
+    starts = ((0, -1), (1, 0), (0, 1), (-1, 0))
+    directions = ((1, 0), (0, 1), (-1, 0), (0, -1))
+    return [
+        (_line(*start, -du, -dv), _line(*start, du, dv)) for start, (du, dv) in zip(starts, directions, strict=True)
+    ]
+
+
+def _line(u: float, v: float, du: float, dv: float) -> Geom2d_Line:
+    return Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(du, dv))
+
+
+def _position(vertex: TopoDS_Vertex) -> tuple[float, float, float]:
+    point = BRep_Tool.Pnt_s(vertex)
+    return point.X(), point.Y(), point.Z()
+
+
+def _translation(shift: list[float]) -> TopLoc_Location:
+    transformation = gp_Trsf()
+    transformation.SetTranslation(gp_Vec(*shift))
+    return TopLoc_Location(transformation)

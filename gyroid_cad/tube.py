@@ -1,0 +1,70 @@
+"""Area, curvature and the tube formula of the gyroid: exact relations between thickness and density.
+
+A wall of constant thickness t round a surface of area A and Euler characteristic chi has the volume
+``A t + (2 pi chi) t^3 / 12`` (Weyl's tube formula; Gauss-Bonnet turns the integral of the Gaussian
+curvature into 2 pi chi). Lengths here are in cell sizes L.
+"""
+
+from __future__ import annotations
+
+from math import acos, cos, pi, sqrt
+
+from gyroid_cad.weierstrass import GYROID, K_PRIME, K
+
+__all__ = [
+    "AREA_PER_CELL",
+    "DENSITY_LIMIT",
+    "EULER_CHARACTERISTIC",
+    "THICKNESS_LIMIT",
+    "density_of_thickness",
+    "face_area",
+    "thickness_of_density",
+]
+
+# The associate surfaces are isometric: the area goes with the square of the scale.
+AREA_PER_CELL = 1.5 * (K / K_PRIME + K_PRIME / K)
+EULER_CHARACTERISTIC = -8
+# Twice the smallest radius of curvature, scale a / 2 at the patch's centre, with a = L / 2.
+THICKNESS_LIMIT = GYROID.scale / 2
+_CUBIC = -2 * pi * EULER_CHARACTERISTIC / 12
+
+
+def density_of_thickness(thickness: float) -> float:
+    """Volume fraction of a wall of constant thickness.
+
+    Parameters
+    ----------
+    thickness : float
+        Whole wall, in cell sizes.
+
+    Returns
+    -------
+    float
+    """
+    return AREA_PER_CELL * thickness - _CUBIC * thickness**3
+
+
+DENSITY_LIMIT = density_of_thickness(THICKNESS_LIMIT)
+
+
+def thickness_of_density(density: float) -> float:
+    """The inverse of :func:`density_of_thickness`, by Viete's formula for three real roots.
+
+    Parameters
+    ----------
+    density : float
+        From 0 to DENSITY_LIMIT.
+
+    Returns
+    -------
+    float
+        Whole wall, in cell sizes.
+    """
+    turning = sqrt(AREA_PER_CELL / (3 * _CUBIC))
+    at_turning = 2 * _CUBIC * turning**3
+    return 2 * turning * cos((acos(-density / at_turning) - 2 * pi) / 3) if density else 0.0
+
+
+def face_area(thickness: float) -> float:
+    """Area per cell of each face of the wall, in squared cell sizes; thickness in cell sizes."""
+    return AREA_PER_CELL + 2 * pi * EULER_CHARACTERISTIC * (thickness / 2) ** 2

@@ -1,0 +1,262 @@
+"""The exact minimal surface: Enneper-Weierstrass map from the complex plane to space.
+
+The surface is ``Re`` of the integral of ``scale e^{i angle} (1-w^2, i(1+w^2), 2w) / sqrt(w^8-14w^4+1)``;
+the paper's eq. (1), corrected, writes that integral with elliptic integrals of the first kind.
+Lengths are in units of the bounding-cell length ``a``.
+
+``w`` is a poor coordinate at the patch's corners (the flat points): there ``w`` behaves as the square
+of a length on the surface. Near the corner ``c`` the chart ``w = c (1 - tau^2)`` is used instead; in
+``tau`` the surface is analytic up to and including the corner. The fourfold rotoinversion
+``X(iw) = (y, -x, -z)`` carries every other corner to that one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from math import atan2, pi, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ellipk, elliprf
+
+from gyroid_cad.errors import ParameterError
+
+__all__ = [
+    "CORNER",
+    "GYROID",
+    "Family",
+    "corner_chart_omega",
+    "corner_chart_points",
+    "corner_chart_tangents",
+    "normals",
+    "points",
+    "quadrature_point",
+    "rotoinversion",
+]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+K = float(ellipk(0.25))
+K_PRIME = float(ellipk(0.75))
+
+with localcontext() as _context:
+    _context.prec = 50
+    _corner = (Decimal(6).sqrt() - Decimal(2).sqrt()) / 2
+    CORNER = float(_corner)
+    # The rounding error of CORNER: with it, c - w is known to full precision for every double w.
+    _CORNER_REMAINDER = float(_corner - Decimal(CORNER))
+
+_DOMAIN_SLACK = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """A member of the Bonnet family of triply periodic minimal surfaces.
+
+    Attributes
+    ----------
+    name : str
+    bonnet_angle : float
+        The angle of the associate surface, in radians.
+    scale : float
+        The normalization factor (the paper's kappa), in units of the bounding-cell length.
+    """
+
+    name: str
+    bonnet_angle: float
+    scale: float
+
+
+GYROID = Family("gyroid", atan2(K, K_PRIME), sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME))
+
+
+def rotoinversion(vectors: ArrayLike, times: int = 1) -> Floats:
+    """Apply ``(x, y, z) -> (y, -x, -z)``, the map of the surface onto itself that takes w to iw.
+
+    Parameters
+    ----------
+    vectors : array_like, shape (..., 3)
+    times : int
+        How often; four times is the identity.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+    """
+    image = np.asarray(vectors, dtype=float)
+    for _ in range(times % 4):
+        image = np.stack([image[..., 1], -image[..., 0], -image[..., 2]], axis=-1)
+    return image
+
+
+def normals(omega: ArrayLike) -> Floats:
+    """Exact unit normals: the inverse stereographic projection of ``omega`` (the Gauss map).
+
+    Parameters
+    ----------
+    omega : array_like of complex, any shape
+
+    Returns
+    -------
+    ndarray, shape (*omega.shape, 3)
+    """
+    w = np.asarray(omega, dtype=complex)
+    squared = np.abs(w) ** 2
+    vectors = np.stack([2 * w.real, 2 * w.imag, squared - 1], axis=-1)
+    return vectors / (1 + squared)[..., np.newaxis]
+
+
+def points(omega: ArrayLike, family: Family = GYROID) -> Floats:
+    """Exact points of the semi-fundamental patch about the origin, eq. (1) corrected.
+
+    Parameters
+    ----------
+    omega : array_like of complex, any shape
+        Inside or on the four circles of radius sqrt(2) that bound the patch (Fig. 2, repeated by w -> iw).
+    family : Family
+
+    Returns
+    -------
+    ndarray, shape (*omega.shape, 3)
+        In units of the bounding-cell length.
+
+    Raises
+    ------
+    ParameterError
+        If a value lies outside the patch's domain.
+    """
+    w = np.asarray(omega, dtype=complex)
+    flat = w.ravel()
+    _require_domain(flat)
+    quarter = np.round(np.angle(flat) / (pi / 2)).astype(int) % 4
+    result = np.empty((flat.size, 3))
+    for turn in range(4):
+        chosen = quarter == turn
+        if chosen.any():
+            turned = flat[chosen] * (1, -1j, -1, 1j)[turn]
+            result[chosen] = rotoinversion(_sector_points(turned, _below_corner(turned), family), turn)
+    return result.reshape((*w.shape, 3))
+
+
+def corner_chart_omega(tau: ArrayLike) -> Complexes:
+    """``w = c (1 - tau^2)``: the chart in which the surface is analytic at the corner c."""
+    t = np.asarray(tau, dtype=complex)
+    return np.asarray(CORNER * (1 - t * t))
+
+
+def corner_chart_points(tau: ArrayLike, family: Family = GYROID) -> Floats:
+    """Exact points at ``w = c (1 - tau^2)``, to rounding even at the corner itself.
+
+    Parameters
+    ----------
+    tau : array_like of complex, any shape
+    family : Family
+
+    Returns
+    -------
+    ndarray, shape (*tau.shape, 3)
+    """
+    t = np.asarray(tau, dtype=complex)
+    positions = _sector_points(corner_chart_omega(t), CORNER * t * t, family)
+    # The corner is a centre of inversion of the surface, tau -> -tau; the integrals see only tau^2.
+    beyond = t.real < 0
+    if np.any(beyond):
+        corner = _sector_points(np.array(CORNER + 0j), np.array(0j), family)
+        positions = np.where(beyond[..., np.newaxis], 2 * corner - positions, positions)
+    return positions
+
+
+def corner_chart_tangents(tau: ArrayLike, family: Family = GYROID) -> Complexes:
+    """The holomorphic derivative ``f`` for which ``dX = Re(f dtau)``.
+
+    Parameters
+    ----------
+    tau : array_like of complex, any shape
+    family : Family
+
+    Returns
+    -------
+    ndarray of complex, shape (*tau.shape, 3)
+    """
+    t = np.asarray(tau, dtype=complex)
+    w = corner_chart_omega(t)
+    square, corner_square = w * w, CORNER * CORNER
+    # sqrt(w^8 - 14 w^4 + 1) without its factor sqrt(c - w) = tau sqrt(c), which dw/dtau cancels.
+    regular = (CORNER + w) * (square + corner_square) * (corner_square**-2 - square * square)
+    factor = -2 * family.scale * np.exp(1j * family.bonnet_angle) * sqrt(CORNER) / np.sqrt(regular)
+    return np.stack([factor * (1 - square), factor * 1j * (1 + square), factor * 2 * w], axis=-1)
+
+
+def quadrature_point(omega: complex, family: Family = GYROID, digits: int = 30) -> Floats:
+    """One point by adaptive quadrature of the Weierstrass integral: the slow, independent check.
+
+    Parameters
+    ----------
+    omega : complex
+    family : Family
+    digits : int
+        Decimal digits mpmath works with.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+    """
+    import mpmath
+
+    with mpmath.workdps(digits):
+        end = mpmath.mpc(omega)
+
+        # w = end (1 - s^2): the square root at a corner becomes smooth in s.
+        def integrand(component: int, s: object) -> object:
+            w = end * (1 - s * s)  # type: ignore[operator]
+            forms = (1 - w**2, 1j * (1 + w**2), 2 * w)
+            return forms[component] / mpmath.sqrt(w**8 - 14 * w**4 + 1) * 2 * s * end  # type: ignore[operator]
+
+        turn = family.scale * mpmath.expj(family.bonnet_angle)
+        integrals = [mpmath.quad(lambda s, i=i: integrand(i, s), [0, 1]) for i in range(3)]
+        return np.array([float(mpmath.re(turn * value)) for value in integrals])
+
+
+def _require_domain(omega: Complexes) -> None:
+    if omega.size == 0:
+        return
+    centres = np.exp(1j * (pi / 4 + pi / 2 * np.arange(4)))
+    excess = np.max(np.abs(omega[:, np.newaxis] + centres) - sqrt(2), axis=1)
+    worst = int(np.argmax(np.where(np.isnan(excess), np.inf, excess)))
+    if not excess[worst] <= _DOMAIN_SLACK:
+        raise ParameterError(
+            "omega",
+            complex(omega[worst]),
+            "a point of the semi-fundamental patch: |omega + e^{i pi (2k+1)/4}| <= sqrt(2) for k = 0..3",
+        )
+
+
+def _below_corner(omega: Complexes) -> Complexes:
+    return np.asarray((CORNER - omega) + _CORNER_REMAINDER)
+
+
+def _sector_points(omega: Complexes, below: Complexes, family: Family) -> Floats:
+    """Points for |arg w| <= 45 degrees, given ``below`` = c - w to full relative precision.
+
+    ``1 - s^2`` is written through its factor ``c - w``: formed by subtraction it would lose half the
+    digits at the corner.
+    """
+    square, corner_square = omega * omega, CORNER * CORNER
+    below_square = below * (CORNER + omega)
+    quartic = square * square + 4 * square + 1
+    s = 2 * sqrt(2) * omega / np.sqrt(quartic)
+    s_complement = below_square * (1 / corner_square - square) / quartic
+    s_vertical = square / corner_square
+    s_vertical_complement = below_square * (corner_square + square) / corner_square**2
+    turn = family.scale * np.exp(1j * family.bonnet_angle)
+    x = (turn * _elliptic_f(s, s_complement, 0.25)).real / (2 * sqrt(2))
+    y = -(turn * _elliptic_f(s, s_complement, 0.75)).imag / (2 * sqrt(2))
+    z = (turn * _elliptic_f(s_vertical, s_vertical_complement, corner_square**4)).real * corner_square
+    return np.stack([x, y, z], axis=-1)
+
+
+def _elliptic_f(s: Complexes, complement: Complexes, m: float) -> Complexes:
+    """Incomplete elliptic integral F(arcsin s | m) by Carlson's symmetric form; complement = 1 - s^2."""
+    return np.asarray(s * elliprf(complement, 1 - m * s * s, 1.0))

@@ -1,0 +1,53 @@
+"""The gyroid as exact-grade B-rep solids.
+
+Names are loaded when first used, so that ``import gyroid_cad`` costs next to nothing and loads neither
+the CAD kernel nor CadQuery nor build123d.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gyroid_cad.version import __version__
+
+if TYPE_CHECKING:
+    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError
+    from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
+    from gyroid_cad.lattice import Lattice, LatticeReport
+    from gyroid_cad.nurbs import NurbsSurface
+
+__all__ = [
+    "ExportError",
+    "FitError",
+    "FitReport",
+    "FitSettings",
+    "GyroidError",
+    "KernelError",
+    "Lattice",
+    "LatticeReport",
+    "NurbsSurface",
+    "ParameterError",
+    "__version__",
+    "fit_patch",
+    "fit_report",
+]
+
+_HOMES = {
+    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError"),
+    "fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
+    "lattice": ("Lattice", "LatticeReport"),
+    "nurbs": ("NurbsSurface",),
+}
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"gyroid_cad.{module}"), name)
+    raise AttributeError(f"module 'gyroid_cad' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,235 @@
+"""From numbers to a checked solid and its files, stage by stage, timed."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gyroid_cad.complex import build_complex
+from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.files import require_writable
+from gyroid_cad.fit import FitSettings, fit_patch
+from gyroid_cad.wall import build_wall
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+__all__ = ["FORMATS", "Build", "Progress", "build", "require_formats", "require_settings"]
+
+Progress = Callable[[str, int, int], None]
+
+FORMATS = {".step": "step", ".stp": "step", ".brep": "brep", ".stl": "stl"}
+
+# Peak memory a cell, as benchmarks/memory.py measures it, rounded up; and what imports and one cell take.
+_SOLID_BYTES_PER_CELL = 1_500_000
+_FILE_BYTES_PER_CELL = 6_000_000
+_BASE_BYTES = 400_000_000
+# Volume in the kernel against that of the nets it was given: rounding only.
+_VOLUME_AGREEMENT = 1e-9
+_REMEMBERED_BUILDS = 2
+
+
+class Build:
+    """A lattice's wall and its solid, checked closed and full, with the seconds each stage took.
+
+    Attributes
+    ----------
+    wall : Wall
+    topology : Topology
+    volume : float
+        In mm3, from the control points the kernel holds.
+    seconds : dict
+        By stage.
+    """
+
+    def __init__(
+        self,
+        cells: tuple[int, int, int],
+        cell_size: float,
+        thickness: float,
+        settings: FitSettings,
+        progress: Progress | None,
+    ) -> None:
+        _require_memory(cells, _SOLID_BYTES_PER_CELL)
+        self.cells = cells
+        self.seconds: dict[str, float] = {}
+        self._valid: bool | None = None
+        with self.timed("fit", progress):
+            patch = fit_patch(settings)
+        with self.timed("complex", progress):
+            complex = build_complex(cells)
+        with self.timed("wall", progress):
+            self.wall = build_wall(complex, patch, cell_size, thickness)
+        with self.timed("kernel", progress):
+            from gyroid_cad.kernel.check import enclosed_volume, topology
+            from gyroid_cad.kernel.solid import realise
+        with self.timed("solid", progress):
+            self._shape = realise(self.wall, lambda done, total: _tell(progress, "solid", done, total))
+        with self.timed("check", progress):
+            self.topology = topology(self._shape)
+            self.volume = enclosed_volume(self._shape)
+            self._require_closed_and_full()
+
+    @contextmanager
+    def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
+        """Tell that a stage begins and ends, and add the seconds between."""
+        start = time.perf_counter()
+        _tell(progress, stage, 0, 1)
+        yield
+        _tell(progress, stage, 1, 1)
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+
+    def solid(self) -> TopoDS_Shape:
+        """A shape of the caller's own, to move as they like, that shares the geometry."""
+        from OCP.TopLoc import TopLoc_Location
+
+        return self._shape.Located(TopLoc_Location())
+
+    def valid(self, progress: Progress | None = None) -> bool:
+        """Whether the kernel's own check, asked once, finds the solid valid."""
+        if self._valid is None:
+            from gyroid_cad.kernel.check import is_valid
+
+            with self.timed("check", progress):
+                self._valid = is_valid(self._shape)
+        return self._valid
+
+    def write(
+        self, targets: Sequence[Path], schema: str, deviation: float, angle: float, progress: Progress | None = None
+    ) -> None:
+        """Write the solid to each target in the format of its ending.
+
+        Raises
+        ------
+        ParameterError
+            If the files would not fit into memory while they are made.
+        KernelError
+            If the kernel finds the solid invalid: then nothing is written.
+        ExportError
+        """
+        from gyroid_cad.kernel.brep import write_brep
+        from gyroid_cad.kernel.step import write_step
+        from gyroid_cad.kernel.stl import write_stl
+
+        _require_memory(self.cells, _FILE_BYTES_PER_CELL)
+        if not self.valid(progress):
+            raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
+        for path in targets:
+            with self.timed(f"write {path.name}", progress):
+                match FORMATS[path.suffix.lower()]:
+                    case "step":
+                        write_step(self._shape, path, schema)
+                    case "brep":
+                        write_brep(self._shape, path)
+                    case _:
+                        write_stl(self._shape, path, deviation, angle)
+
+    def _require_closed_and_full(self) -> None:
+        if not self.topology.closed:
+            raise KernelError(
+                f"the kernel's shape of {self.cells} cells is not closed: "
+                f"{self.topology.open_edges} edges do not bound exactly two faces"
+            )
+        expected = self.wall.volume()
+        if not abs(self.volume - expected) <= _VOLUME_AGREEMENT * expected:
+            raise KernelError(
+                f"the kernel's shape of {self.cells} cells encloses {self.volume:.9g} mm3, "
+                f"its control nets {expected:.9g} mm3"
+            )
+
+
+_builds: OrderedDict[tuple[object, ...], Build] = OrderedDict()
+
+
+def build(
+    cells: tuple[int, int, int],
+    cell_size: float,
+    thickness: float,
+    settings: FitSettings,
+    progress: Progress | None = None,
+) -> Build:
+    """The build of a lattice; the last few are remembered.
+
+    Parameters
+    ----------
+    cells : tuple of int
+    cell_size, thickness : float
+        In mm.
+    settings : FitSettings
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    ParameterError
+        If memory would not do, saying how much it would take.
+    FitError
+        If the fit's edges do not meet those of its neighbours.
+    KernelError
+        If the kernel's shape is not closed or does not enclose the right volume.
+    """
+    key = (cells, cell_size, thickness, settings)
+    if key not in _builds:
+        made = Build(cells, cell_size, thickness, settings, progress)
+        while len(_builds) >= _REMEMBERED_BUILDS:
+            _builds.popitem(last=False)
+        _builds[key] = made
+    _builds.move_to_end(key)
+    return _builds[key]
+
+
+def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
+    """Check the endings and folders of files to be written, before anything is built.
+
+    Raises
+    ------
+    ParameterError
+    """
+    targets = []
+    for path in paths:
+        if Path(path).suffix.lower() not in FORMATS:
+            raise ParameterError("output", str(path), f"a file name ending in {', '.join(FORMATS)}")
+        targets.append(require_writable(path))
+    if len({target.resolve() for target in targets}) < len(targets):
+        raise ParameterError("output", [str(path) for path in paths], "each file once")
+    return targets
+
+
+def require_settings(targets: Sequence[Path], schema: str, deviation: float, angle: float) -> None:
+    """Check the settings of files to be written, before anything is built.
+
+    Raises
+    ------
+    ParameterError
+    """
+    from gyroid_cad.kernel.step import require_schema
+    from gyroid_cad.kernel.stl import require_meshing
+
+    require_schema(schema)
+    require_meshing(deviation, angle)
+
+
+def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int) -> None:
+    import psutil
+
+    needed = _BASE_BYTES + prod(cells) * bytes_per_cell
+    available = psutil.virtual_memory().available
+    if needed > available:
+        most = max(0, (available - _BASE_BYTES) // bytes_per_cell)
+        raise ParameterError(
+            "cells",
+            cells,
+            f"at most about {most} cells in all: these take about {needed / 1e9:.3g} GB of memory "
+            f"and {available / 1e9:.3g} GB are free",
+        )
+
+
+def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
+    if progress is not None:
+        progress(stage, done, total)

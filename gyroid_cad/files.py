@@ -1,0 +1,60 @@
+"""Files appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gyroid_cad.errors import ExportError, ParameterError
+
+__all__ = ["replacing", "require_writable"]
+
+
+def require_writable(path: str | os.PathLike[str]) -> Path:
+    """Check, before any work is done, that a file can be put at ``path``.
+
+    Raises
+    ------
+    ParameterError
+        If its folder is missing or cannot be written to, or the path is a folder.
+    """
+    target = Path(path)
+    folder = target.resolve().parent
+    if not folder.is_dir():
+        raise ParameterError("output", str(path), f"a file in an existing folder; {folder} is none")
+    if target.is_dir():
+        raise ParameterError("output", str(path), "a file, not a folder")
+    if not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
+        raise ParameterError("output", str(path), f"a file that may be written; {folder} does not allow it")
+    return target
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary name beside ``path``; move it there if all went well, remove it if not.
+
+    Parameters
+    ----------
+    path : path-like
+        A link is followed: the file it points to is replaced.
+
+    Raises
+    ------
+    ExportError
+        If the file could not be written or moved.
+    """
+    target = Path(path).resolve()
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.partial")
+    try:
+        yield temporary
+        with temporary.open("rb") as written:
+            os.fsync(written.fileno())
+        temporary.replace(target)
+    except OSError as problem:
+        if isinstance(problem, ExportError):
+            raise
+        raise ExportError(f"{path} was not written: {problem.strerror or problem}") from problem
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,121 @@
+"""What the kernel really holds: closed or not, valid or not, and how much it encloses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.Geom import Geom_BSplineSurface
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Shape
+from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.surfaces import nurbs_of_surface
+from gyroid_cad.nurbs import gauss_points
+
+__all__ = ["Topology", "enclosed_volume", "is_valid", "topology"]
+
+Floats = NDArray[np.float64]
+
+# A rational or cubic face's flux integrand; exact for cubics (degree 8).
+_FLUX_POINTS_PER_SPAN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """Counts of a shape's parts.
+
+    Attributes
+    ----------
+    solids, faces : int
+    open_edges : int
+        Edges that do not bound exactly two faces, once in each direction.
+    """
+
+    solids: int
+    faces: int
+    open_edges: int
+
+    @property
+    def closed(self) -> bool:
+        return self.solids > 0 and self.open_edges == 0
+
+
+def topology(shape: TopoDS_Shape) -> Topology:
+    """Count solids, faces and edges that are not shared by exactly two faces."""
+    faces_of_edge = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, faces_of_edge)
+    extents = (faces_of_edge.FindFromIndex(i).Extent() for i in range(1, faces_of_edge.Extent() + 1))
+    return Topology(
+        solids=_count(shape, TopAbs_SOLID),
+        faces=_count(shape, TopAbs_FACE),
+        open_edges=sum(extent != 2 for extent in extents),
+    )
+
+
+def is_valid(shape: TopoDS_Shape) -> bool:
+    """The kernel's own check of geometry, topology and orientation (``BRepCheck_Analyzer``)."""
+    return bool(BRepCheck_Analyzer(shape, True, True).IsValid())
+
+
+def enclosed_volume(shape: TopoDS_Shape) -> float:
+    """Volume in mm3 from the control points the kernel holds, by the divergence theorem.
+
+    Gauss quadrature of the flux of p/3 through every face, exact for polynomial B-spline faces
+    (``BRepGProp`` is off by 6e-5 on the same faces, and a thousand times slower). Negative if the
+    shape is inside out.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+        Its faces are whole ``Geom_BSplineSurface``s, not trimmed.
+
+    Raises
+    ------
+    KernelError
+        If a face is something else.
+    """
+    fluxes: dict[int, tuple[Geom_BSplineSurface, float, Floats]] = {}
+    volume = 0.0
+    explorer = TopExp_Explorer(shape, TopAbs_FACE)
+    while explorer.More():
+        face = TopoDS.Face_s(explorer.Current())
+        location = TopLoc_Location()
+        surface = BRep_Tool.Surface_s(face, location)
+        if id(surface) not in fluxes:
+            if not isinstance(surface, Geom_BSplineSurface):
+                raise KernelError(f"volume of a face on a {type(surface).__name__}: only B-spline faces are summed")
+            # The surface is kept alive with its flux, so that its id stays its own.
+            fluxes[id(surface)] = (surface, *_flux(surface))
+        _, flux, area = fluxes[id(surface)]
+        shift = location.Transformation().TranslationPart()
+        value = flux + area @ (shift.X(), shift.Y(), shift.Z()) / 3
+        volume += -value if face.Orientation() == TopAbs_REVERSED else value
+        explorer.Next()
+    return float(volume)
+
+
+def _flux(surface: Geom_BSplineSurface) -> tuple[float, Floats]:
+    """Flux of p/3 through the surface, and its area vector, both towards du x dv."""
+    nurbs = nurbs_of_surface(surface)
+    u_points, u_weights = gauss_points(nurbs.knots_u, _FLUX_POINTS_PER_SPAN)
+    v_points, v_weights = gauss_points(nurbs.knots_v, _FLUX_POINTS_PER_SPAN)
+    u, v = (grid.ravel() for grid in np.meshgrid(u_points, v_points, indexing="ij"))
+    d = nurbs.derivatives(u, v)
+    area = np.cross(d[1, 0], d[0, 1]) * np.outer(u_weights, v_weights).reshape(-1, 1)
+    return float(np.sum(d[0, 0] * area)) / 3, area.sum(axis=0)
+
+
+def _count(shape: TopoDS_Shape, kind: object) -> int:
+    count = 0
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        count += 1
+        explorer.Next()
+    return count

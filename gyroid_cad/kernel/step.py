@@ -1,0 +1,142 @@
+"""STEP files (ISO 10303-21) through ``STEPControl_Writer`` and ``STEPControl_Reader``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import MappingProxyType
+
+from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
+from OCP.Message import Message, Message_Gravity
+from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
+from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopoDS import TopoDS_Shape
+
+from gyroid_cad.errors import ExportError, ParameterError
+from gyroid_cad.files import replacing
+from gyroid_cad.version import __version__
+
+__all__ = ["SCHEMAS", "read_step", "require_schema", "write_step"]
+
+SCHEMAS = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
+
+
+def require_schema(schema: str) -> str:
+    """The kernel's name of a schema.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if schema not in SCHEMAS:
+        raise ParameterError("schema", schema, " or ".join(SCHEMAS))
+    return SCHEMAS[schema]
+
+
+def write_step(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], schema: str = "ap214", name: str | None = None
+) -> None:
+    """Write a shape in millimetres.
+
+    Curves in the parameter plane are left out: every edge of ours is a border line of its surface, which
+    readers find again at once, and the file is an eighth smaller.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    path : path-like
+        Written under a temporary name and moved into place.
+    schema : {"ap214", "ap242"}
+    name : str, optional
+        Of the product; the file's stem if left out.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    kernel_schema = require_schema(schema)
+    product = Path(path).stem if name is None else name
+    settings = {
+        "write.step.schema": kernel_schema,
+        "write.step.unit": "MM",
+        "write.step.product.name": product,
+        "write.surfacecurve.mode": 0,
+    }
+    # The first writer of a process registers the settings; the schema counts when a model is made.
+    STEPControl_Writer()
+    with replacing(path) as temporary, _kernel_settings(settings), _silenced_messages():
+        writer = STEPControl_Writer()
+        if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
+            raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
+        _fill_header(writer, product)
+        if writer.Write(str(temporary)) != IFSelect_RetDone:
+            raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+
+
+def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
+    """Read the shape of a STEP file, in millimetres.
+
+    Raises
+    ------
+    ExportError
+        If the file is missing, not STEP, or holds no shape.
+    """
+    with _silenced_messages():
+        reader = STEPControl_Reader()
+        if reader.ReadFile(str(path)) != IFSelect_RetDone:
+            raise ExportError(f"{path} could not be read as STEP")
+        reader.TransferRoots()
+        shape = reader.OneShape()
+    if shape.IsNull():
+        raise ExportError(f"{path} holds no shape")
+    return shape
+
+
+def _fill_header(writer: STEPControl_Writer, product: str) -> None:
+    header = APIHeaderSection_MakeHeader(writer.Model())
+    text = TCollection_HAsciiString
+    header.SetName(text(product))
+    header.SetAuthorValue(1, text(""))
+    header.SetOrganizationValue(1, text(""))
+    header.SetDescriptionValue(1, text("gyroid lattice"))
+    header.SetOriginatingSystem(text(f"gyroid_cad {__version__}"))
+    header.SetAuthorisation(text(""))
+
+
+@contextmanager
+def _kernel_settings(settings: dict[str, str | int]) -> Iterator[None]:
+    """Set ``Interface_Static`` values, which are global to the process, and put the old ones back."""
+    before: dict[str, str | int] = {}
+    try:
+        for key, value in settings.items():
+            if isinstance(value, int):
+                before[key] = Interface_Static.IVal_s(key)
+                Interface_Static.SetIVal_s(key, value)
+            else:
+                before[key] = Interface_Static.CVal_s(key)
+                Interface_Static.SetCVal_s(key, value)
+        yield
+    finally:
+        for key, value in before.items():
+            if isinstance(value, int):
+                Interface_Static.SetIVal_s(key, value)
+            else:
+                Interface_Static.SetCVal_s(key, value)
+
+
+@contextmanager
+def _silenced_messages() -> Iterator[None]:
+    """Keep the translators' statistics off the user's terminal; warnings and failures still come through."""
+    printers = list(Message.DefaultMessenger_s().Printers())
+    levels = [printer.GetTraceLevel() for printer in printers]
+    try:
+        for printer in printers:
+            printer.SetTraceLevel(Message_Gravity.Message_Alarm)
+        yield
+    finally:
+        for printer, level in zip(printers, levels, strict=True):
+            printer.SetTraceLevel(level)

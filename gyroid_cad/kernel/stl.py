@@ -1,0 +1,119 @@
+"""Triangles of a solid by the kernel's mesher, as binary STL."""
+
+from __future__ import annotations
+
+import os
+from math import isfinite, radians
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.gp import gp_Trsf, gp_Vec
+from OCP.Poly import Poly_Triangulation
+from OCP.StlAPI import StlAPI_Writer
+from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
+from OCP.TopExp import TopExp
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+
+from gyroid_cad.errors import ExportError, ParameterError
+from gyroid_cad.files import replacing
+from gyroid_cad.kernel.solid import TOLERANCE
+
+__all__ = ["DEFAULT_ANGLE", "require_meshing", "write_stl"]
+
+# Degrees between neighbouring facets.
+DEFAULT_ANGLE = 15.0
+# How far triangles that touch without belonging together are parted: a thousandth of the deviation, but
+# enough for the single-precision numbers of STL to tell them apart.
+_PARTING = 1e-3
+_SINGLE_PRECISION_STEPS = 8
+
+Floats = NDArray[np.float64]
+
+
+def require_meshing(deviation: float, angle: float) -> None:
+    """Check the mesher's two limits.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not (isfinite(deviation) and deviation > 0):
+        raise ParameterError("deviation", deviation, "a length above 0 mm")
+    if not (isfinite(angle) and 0 < angle < 90):
+        raise ParameterError("angle", angle, "above 0 and below 90 degrees")
+
+
+def write_stl(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> None:
+    """Mesh a solid (``BRepMesh_IncrementalMesh``) and write it as binary STL, in millimetres.
+
+    STL knows nothing but coordinates: where the solid touches itself in a line, four triangles would share an
+    edge. There the vertices, which are distinct in the solid, are moved apart by a thousandth of the deviation.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+        Left without triangles: a copy that shares its geometry is meshed.
+    path : path-like
+    deviation : float
+        Largest distance of a facet from the surface, in mm.
+    angle : float
+        Largest angle between neighbouring facets, in degrees.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    require_meshing(deviation, angle)
+    copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
+    mesher = BRepMesh_IncrementalMesh(copy, deviation, False, radians(angle), True)
+    if not mesher.IsDone():
+        raise ExportError(f"{path} was not written: the kernel's mesher failed")
+    _part_touching_vertices(copy, deviation)
+    writer = StlAPI_Writer()
+    writer.ASCIIMode = False
+    with replacing(path) as temporary:
+        if not writer.Write(copy, str(temporary)):
+            raise ExportError(f"{path} was not written: the kernel's STL writer failed")
+
+
+def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
+    """Move mesh nodes at vertices that coincide but are not the same, each into its own faces."""
+    from scipy.spatial import cKDTree
+
+    faces_of_vertex = TopTools_IndexedDataMapOfShapeListOfShape()
+    TopExp.MapShapesAndAncestors_s(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex)
+    points = [
+        BRep_Tool.Pnt_s(TopoDS.Vertex_s(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)
+    ]
+    positions = np.array([(p.X(), p.Y(), p.Z()) for p in points])
+    distance = max(
+        _PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * float(np.abs(positions).max())
+    )
+    touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
+    for vertex in touching.tolist():
+        # A face used by two edges at the vertex is listed twice.
+        # A face used by two edges at the vertex is listed twice.
+        faces = {face.__hash__(): TopoDS.Face_s(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
+        meshes = [_placed_mesh(face) for face in faces.values()]
+        inward = np.mean([nodes.mean(axis=0) - positions[vertex] for _, _, nodes in meshes], axis=0)
+        step = gp_Vec(*(inward * (distance / np.linalg.norm(inward))).tolist())
+        for mesh, placement, nodes in meshes:
+            node = int(np.argmin(np.sum((nodes - positions[vertex]) ** 2, axis=1))) + 1
+            moved = mesh.Node(node).Transformed(placement).Translated(step)
+            mesh.SetNode(node, moved.Transformed(placement.Inverted()))
+
+
+def _placed_mesh(face: TopoDS_Face) -> tuple[Poly_Triangulation, gp_Trsf, Floats]:
+    """A face's triangulation, where it stands, and its nodes there; shape (nodes, 3)."""
+    location = TopLoc_Location()
+    mesh = BRep_Tool.Triangulation_s(face, location)
+    placement = location.Transformation()
+    placed = (mesh.Node(i).Transformed(placement) for i in range(1, mesh.NbNodes() + 1))
+    return mesh, placement, np.array([(p.X(), p.Y(), p.Z()) for p in placed])

@@ -18,7 +18,7 @@ from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.wall import build_wall
 
 if TYPE_CHECKING:
-    from OCP.TopoDS import TopoDS_Shape
+    from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["FORMATS", "Build", "Progress", "build", "require_formats", "require_settings"]
 
@@ -85,11 +85,11 @@ class Build:
         _tell(progress, stage, 1, 1)
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
 
-    def solid(self) -> TopoDS_Shape:
+    def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""
-        from OCP.TopLoc import TopLoc_Location
+        from gyroid_cad.kernel.solid import another_handle
 
-        return self._shape.Located(TopLoc_Location())
+        return another_handle(self._shape)
 
     def valid(self, progress: Progress | None = None) -> bool:
         """Whether the kernel's own check, asked once, finds the solid valid."""

@@ -16,7 +16,7 @@ from gyroid_cad.tube import DENSITY_LIMIT, THICKNESS_LIMIT, density_of_thickness
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
-    from OCP.TopoDS import TopoDS_Shape
+    from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport"]
 
@@ -160,7 +160,7 @@ class Lattice:
         low, high = self.wall().bounding_box()
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
-    def solid(self, progress: Progress | None = None) -> TopoDS_Shape:
+    def solid(self, progress: Progress | None = None) -> KernelShape:
         """The lattice as a closed solid, checked.
 
         Built once and remembered; each call hands out a shape of its own that shares the geometry, so that

@@ -41,8 +41,12 @@ class Sampled:
         derivatives = np.stack([legendre.legval(nodes, legendre.legder(c)) for c in np.eye(count)], axis=1)
         differentiate = derivatives @ np.linalg.inv(legendre.legvander(nodes, count - 1))
         self.points, self.normals = smooth(nodes[:, np.newaxis], nodes)
-        self.points_u, self.normals_u = (np.einsum("ij,jkc->ikc", differentiate, f) for f in (self.points, self.normals))
-        self.points_v, self.normals_v = (np.einsum("kj,ijc->ikc", differentiate, f) for f in (self.points, self.normals))
+        self.points_u, self.normals_u = (
+            np.einsum("ij,jkc->ikc", differentiate, f) for f in (self.points, self.normals)
+        )
+        self.points_v, self.normals_v = (
+            np.einsum("kj,ijc->ikc", differentiate, f) for f in (self.points, self.normals)
+        )
         self.weights = np.outer(weights, weights)
 
     @property
@@ -181,7 +185,9 @@ def test_quadrature_of_the_smooth_patch_converges_geometrically() -> None:
 
 def _coefficients(points: Floats) -> Floats:
     """Chebyshev coefficients from samples at _chebyshev_nodes, largest component."""
-    return np.asarray(np.max(np.abs(chebyshev.chebfit(chebyshev.chebpts1(len(points)), points, len(points) - 1)), axis=1))
+    return np.asarray(
+        np.max(np.abs(chebyshev.chebfit(chebyshev.chebpts1(len(points)), points, len(points) - 1)), axis=1)
+    )
 
 
 @pytest.mark.parametrize("v", [-1.0, 0.3, 1.0])

@@ -27,14 +27,12 @@ def domain_point(radius: float, phi: float, turn: int) -> complex:
 
 
 def omegas(largest_radius: float = 1.0) -> st.SearchStrategy[complex]:
-    return st.builds(
-        domain_point, st.floats(0, largest_radius), st.floats(-pi / 12, pi / 12), st.integers(0, 3)
-    )
+    return st.builds(domain_point, st.floats(0, largest_radius), st.floats(-pi / 12, pi / 12), st.integers(0, 3))
 
 
-def chart_values(lowest: float = 0.0) -> st.SearchStrategy[complex]:
-    """Values of tau in the sector of the corner: right half plane, well inside the chart."""
-    return st.builds(lambda r, a: complex(r * np.exp(1j * a)), st.floats(lowest, 0.6), st.floats(-0.6, 0.6))
+def chart_values() -> st.SearchStrategy[complex]:
+    """Values of tau inside the patch, whose angle at the corner is 60 degrees in this chart."""
+    return st.builds(lambda r, a: complex(r * np.exp(1j * a)), st.floats(0, 0.6), st.floats(-0.4, 0.4))
 
 
 @pytest.mark.parametrize(
@@ -63,9 +61,11 @@ def test_the_centre_is_the_origin() -> None:
 
 
 def test_corners_stand_over_a_square_at_alternating_heights() -> None:
-    corners = ws.points(ws.CORNER * np.array([1, 1j, -1, -1j]))
+    # The corner itself is no double: half the digits of a point there hang on the last one of omega.
+    corners = np.stack([ws.rotoinversion(ws.corner_chart_points(0), k) for k in range(4)])
     np.testing.assert_allclose(np.abs(corners), [[sqrt(2) / 4, sqrt(2) / 4, 1 / 4]] * 4, rtol=0, atol=1e-15)
     np.testing.assert_allclose(corners[:, 2], -np.roll(corners[:, 2], 1), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(ws.points(ws.CORNER * np.array([1, 1j, -1, -1j])), corners, rtol=0, atol=1e-8)
 
 
 def test_constants_are_those_of_the_complete_integrals() -> None:
@@ -135,7 +135,7 @@ def test_corner_chart_agrees_with_points(tau: complex) -> None:
 @settings(max_examples=50, deadline=None)
 @given(chart_values())
 def test_corner_chart_is_odd_about_the_corner(tau: complex) -> None:
-    corner = ws.points(ws.CORNER)
+    corner = ws.corner_chart_points(0)
     there, back = ws.corner_chart_points(np.array([tau, -tau])) - corner
     np.testing.assert_allclose(back, -there, rtol=0, atol=1e-15)
 
@@ -156,7 +156,7 @@ def test_associate_surfaces_are_isometric(tau: complex, angle: float) -> None:
     assert other == pytest.approx(metric, rel=1e-14)
 
 
-@pytest.mark.parametrize("tau", [0.0, 0.05j + 0.02, 0.3, 0.4 - 0.2j])
+@pytest.mark.parametrize("tau", [0.0, 0.05j + 0.06, 0.3, 0.4 - 0.2j])
 def test_tangents_are_the_limit_of_central_differences_at_second_order(tau: complex) -> None:
     def error(step: float) -> float:
         difference = (ws.corner_chart_points(tau + step) - ws.corner_chart_points(tau - step)) / (2 * step)

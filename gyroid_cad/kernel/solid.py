@@ -14,9 +14,10 @@ from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_Line
 from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
-from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
+    TopoDS,
     TopoDS_Compound,
     TopoDS_Edge,
     TopoDS_Face,
@@ -31,7 +32,9 @@ from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface
 from gyroid_cad.nurbs import NurbsCurve
 from gyroid_cad.wall import SIDES, Wall
 
-__all__ = ["TOLERANCE", "realise"]
+__all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise"]
+
+KernelShape = TopoDS_Shape
 
 # The kernel's own smallest distance (Precision::Confusion): shared edges agree to rounding.
 TOLERANCE = 1e-7
@@ -54,6 +57,12 @@ def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> T
         Or a TopoDS_Compound of solids where the lattice falls into pieces that share no edge.
     """
     return _Realisation(wall).build(progress or (lambda done, total: None))
+
+
+def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
+    """The same topology and geometry under a handle of its own: moving one does not move the other."""
+    twin = shape.Located(TopLoc_Location())
+    return TopoDS.Solid_s(twin) if twin.ShapeType() == TopAbs_SOLID else TopoDS.Compound_s(twin)
 
 
 class _Realisation:

@@ -1,0 +1,85 @@
+"""Peak memory and file size for each cell: of the solid, of writing it as STEP, of meshing it as STL.
+
+Every figure is the peak resident memory of a fresh process; the slope over the number of cells is what a
+cell costs, the intercept what the interpreter and the kernel cost. The check of available memory before a
+build rests on these slopes.
+
+Run: ``python -m benchmarks.memory [--sides 2 4 6]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.timing import fresh_python, plain_table
+
+__all__ = ["main"]
+
+_KINDS = ("solid", "step", "stl")
+# ru_maxrss is in kilobytes on Linux, in bytes on macOS.
+_RSS_UNIT = 1 if sys.platform == "darwin" else 1024
+
+
+def main(arguments: Sequence[str] = ()) -> bool:
+    """Print the tables; nothing is required, so always True."""
+    parser = argparse.ArgumentParser(description="Measure peak memory in fresh processes.")
+    parser.add_argument("--sides", type=int, nargs="+", default=[2, 4, 6], help="cells along a side (default 2 4 6)")
+    sides = parser.parse_args(arguments).sides
+    measured = {kind: np.array([_measured(kind, side) for side in sides]) for kind in _KINDS}
+    cells = np.array(sides) ** 3
+    _print_peaks(cells, measured)
+    _print_slopes(cells, measured)
+    return True
+
+
+def _print_peaks(cells: np.ndarray, measured: dict[str, np.ndarray]) -> None:
+    headings = ("peak memory, MB; file size, MB", *(f"{count} cells" for count in cells))
+    lines = [(kind, *(f"{peak / 1e6:.0f}; {size / 1e6:.1f}" for peak, size in measured[kind])) for kind in _KINDS]
+    plain_table("Peak memory of a fresh process", headings, lines)
+
+
+def _print_slopes(cells: np.ndarray, measured: dict[str, np.ndarray]) -> None:
+    lines = []
+    for kind in _KINDS:
+        peak, size = (np.polynomial.Polynomial.fit(cells, column, 1).convert().coef for column in measured[kind].T)
+        lines.append((kind, f"{peak[0] / 1e6:.0f} MB", f"{peak[1] / 1e3:.0f} kB", f"{size[1] / 1e3:.0f} kB"))
+    plain_table("What a cell costs", ("up to", "before the first", "memory a cell", "file a cell"), lines)
+
+
+def _measured(kind: str, side: int) -> tuple[int, int]:
+    """Peak memory and file size in bytes, from a process of its own."""
+    peak, size = fresh_python("-m", "benchmarks.memory", "--alone", kind, str(side)).split()
+    return int(peak), int(size)
+
+
+def _alone(kind: str, side: int) -> None:
+    """Build, write, and print this process's peak and the size of what it wrote."""
+    from benchmarks.subject import CELL_SIZE, block_solid
+    from gyroid_cad.kernel.step import write_step
+    from gyroid_cad.kernel.stl import write_stl
+
+    solid = block_solid(side)
+    size = 0
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"block.{kind}"
+        if kind == "step":
+            write_step(solid, path)
+        elif kind == "stl":
+            write_stl(solid, path, CELL_SIZE / 1000)
+        if path.exists():
+            size = path.stat().st_size
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_UNIT, size)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--alone"]:
+        _alone(sys.argv[2], int(sys.argv[3]))
+    else:
+        main(sys.argv[1:])

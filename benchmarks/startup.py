@@ -1,0 +1,62 @@
+"""What a user waits for before the first result, each time in fresh processes, best of several.
+
+Importing and the first fit are timed inside the process, after the interpreter has started; building one
+cell to STEP and importing CadQuery are timed as whole processes.
+
+Run: ``python -m benchmarks.startup [--repeats N]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from benchmarks.timing import Row, best_process_time, print_verdicts, printed_by
+
+__all__ = ["main"]
+
+_IMPORT = """
+from time import perf_counter
+start = perf_counter()
+import gyroid_cad
+print(perf_counter() - start)
+"""
+_FIRST_FIT = """
+import gyroid_cad
+from time import perf_counter
+start = perf_counter()
+gyroid_cad.fit_patch()
+print(perf_counter() - start)
+"""
+_BUILD = ("-m", "gyroid_cad", "build", "--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "0.8", "--quiet")
+
+
+def main(arguments: Sequence[str] = ()) -> bool:
+    """Print the table; returns whether every requirement is met."""
+    parser = argparse.ArgumentParser(description="Time the start of fresh processes.")
+    parser.add_argument("--repeats", type=int, default=5, help="the best counts (default 5)")
+    repeats = parser.parse_args(arguments).repeats
+    importing = min(printed_by(_IMPORT)[0] for _ in range(repeats))
+    fitting = min(printed_by(_FIRST_FIT)[0] for _ in range(repeats))
+    with TemporaryDirectory() as folder:
+        building = best_process_time(repeats, *_BUILD, "-o", str(Path(folder) / "cell.step"))
+    cadquery = best_process_time(repeats, "-c", "import cadquery")
+    kernel = best_process_time(repeats, "-c", "import OCP.BRep")
+    return print_verdicts(
+        "Start",
+        [
+            Row("import gyroid_cad", importing, 0.3, 0.15, " s"),
+            Row("first fit_patch(), with the imports it triggers", fitting, 0.5, 0.2, " s"),
+            Row("gyroid-cad build, one cell to STEP / import cadquery", building / cadquery, 1, 0.5, "x"),
+            Row("gyroid-cad build, one cell to STEP", building, unit=" s", remark="whole process"),
+            Row("python -c 'import cadquery'", cadquery, unit=" s", remark="whole process"),
+            Row("python -c 'import OCP.BRep'", kernel, unit=" s", remark="whole process: the kernel alone"),
+        ],
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(not main(sys.argv[1:]))

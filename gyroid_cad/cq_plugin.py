@@ -1,0 +1,75 @@
+"""CadQuery: importing this module adds ``Workplane.gyroid``, and nothing else.
+
+>>> import cadquery as cq
+>>> import gyroid_cad.cq_plugin
+>>> result = cq.Workplane().gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cadquery as cq
+
+from gyroid_cad.errors import GyroidError
+from gyroid_cad.fit import FitSettings
+from gyroid_cad.lattice import Lattice
+
+__all__ = ["gyroid"]
+
+_NAME = "gyroid"
+
+
+def gyroid(
+    self: cq.Workplane,
+    cells: tuple[int, int, int],
+    cell_size: float,
+    thickness: float | None = None,
+    density: float | None = None,
+    fit: FitSettings | None = None,
+    centered: bool | tuple[bool, bool, bool] = True,
+    combine: Any = True,
+    clean: bool = False,
+) -> cq.Workplane:
+    """A gyroid lattice at each point of the stack.
+
+    Parameters
+    ----------
+    cells, cell_size, thickness, density, fit
+        As of :class:`gyroid_cad.Lattice`; lengths in mm.
+    centered : bool or tuple of bool
+        As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
+        is on the point, along each axis.
+    combine : bool or str
+        As of ``Workplane.eachpoint``: True or "a" to fuse with the solid in the chain, "cut" or "s" to cut
+        from it, False to keep the lattices separate.
+    clean : bool
+        Merge faces afterwards. Off unless asked for, for no two faces of a lattice lie on one surface.
+
+    Returns
+    -------
+    Workplane
+
+    Raises
+    ------
+    ParameterError, FitError, KernelError
+    """
+    lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings())
+    low, high = lattice.bounding_box()
+    per_axis = (centered,) * 3 if isinstance(centered, bool) else centered
+    offset = [-(a + b) / 2 if middle else -a for a, b, middle in zip(low, high, per_axis, strict=True)]
+    shape = cq.Shape.cast(lattice.solid()).moved(cq.Location(cq.Vector(*offset)))
+    return self.eachpoint(lambda location: shape.moved(location), True, combine, clean)
+
+
+def _install() -> None:
+    present = getattr(cq.Workplane, _NAME, None)
+    if present is not None and getattr(present, "__module__", None) != __name__:
+        raise GyroidError(
+            f"cadquery.Workplane.{_NAME} is taken by {getattr(present, '__module__', present)}; "
+            "gyroid_cad.cq_plugin does not replace it"
+        )
+    cq.Workplane.gyroid = gyroid
+
+
+_install()

@@ -17,7 +17,7 @@ from gyroid_cad.lattice import Lattice
 __all__ = ["Gyroid"]
 
 
-class Gyroid(BasePartObject):
+class Gyroid(BasePartObject):  # type: ignore[misc]
     """Part Object: Gyroid
 
     A gyroid lattice, aligned by its bounding box.

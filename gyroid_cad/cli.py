@@ -34,13 +34,21 @@ def commands() -> None:
 
 @commands.command()
 @click.option(
-    "-o", "--output", "outputs", multiple=True, required=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated."
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    metavar="FILE",
+    help=".step, .stp, .brep or .stl; may be repeated.",
 )
 @click.option("--cells", nargs=3, type=int, required=True, metavar="NX NY NZ", help="Cubic cells along x, y and z.")
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option("--thickness", type=float, metavar="MM", help="Whole wall, below 0.37647 of the cell size.")
 @click.option("--density", type=float, metavar="RHO", help="Volume fraction instead of thickness, below 0.94034.")
-@click.option("--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side.")
+@click.option(
+    "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side."
+)
 @click.option(
     "--fit",
     type=click.Choice(["smooth", "paper"]),
@@ -48,7 +56,9 @@ def commands() -> None:
     show_default=True,
     help="The paper's own leaves gaps between patches, and is refused with their size.",
 )
-@click.option("--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files.")
+@click.option(
+    "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
+)
 @click.option("--deviation", type=float, metavar="MM", help="Of STL facets; a thousandth of the cell size if left out.")
 @click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between STL facets.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
@@ -90,7 +100,9 @@ def build(
 
 
 @commands.command("fit-report")
-@click.option("--control-points", type=int, default=10, show_default=True, metavar="N", help="Of our fit, along a side.")
+@click.option(
+    "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of our fit, along a side."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def fit_report_command(control_points: int, as_json: bool) -> None:
     """What our fit and the paper's are worth, side by side."""
@@ -131,20 +143,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         status = commands.main(arguments, prog_name=PROGRAM, standalone_mode=False)
-        return status if isinstance(status, int) else DONE
     except click.exceptions.NoArgsIsHelpError as shown:
         click.echo(shown.format_message(), err=True)
-        return BAD_USAGE
+        status = BAD_USAGE
     except click.ClickException as problem:
-        return _fail(problem.format_message(), BAD_USAGE)
+        status = _fail(problem.format_message(), BAD_USAGE)
     except ParameterError as problem:
-        return _fail(_with_option_name(problem), BAD_USAGE)
+        status = _fail(_with_option_name(problem), BAD_USAGE)
     except GyroidError as problem:
-        return _fail(str(problem), FAILED)
+        status = _fail(str(problem), FAILED)
     except (click.Abort, KeyboardInterrupt):
-        return _fail("interrupted", INTERRUPTED)
+        status = _fail("interrupted", INTERRUPTED)
     except Exception as problem:  # a defect of ours is still one line for the user
-        return _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
+        status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
+    return status if isinstance(status, int) else DONE
 
 
 def _fail(message: str, status: int) -> int:

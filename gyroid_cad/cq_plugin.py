@@ -59,7 +59,7 @@ def gyroid(
     per_axis = (centered,) * 3 if isinstance(centered, bool) else centered
     offset = [-(a + b) / 2 if middle else -a for a, b, middle in zip(low, high, per_axis, strict=True)]
     shape = cq.Shape.cast(lattice.solid()).moved(cq.Location(cq.Vector(*offset)))
-    return self.eachpoint(lambda location: shape.moved(location), True, combine, clean)
+    return self.eachpoint(shape.moved, True, combine, clean)
 
 
 def _install() -> None:

@@ -35,7 +35,9 @@ FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS = 4, 40
 EDGE_GAP_LIMIT = 1e-12
 _SAMPLES_PER_SPAN = 4
 _CLOUD_RADII = 48
+_REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
+_FOOT_POINT_STEPS = 4
 # Lengths here are in bounding-cell lengths a; reports are in cell sizes L = 2 a.
 _CELL_SIZE = 2.0
 
@@ -135,7 +137,7 @@ class FitReport:
 
 
 @lru_cache(maxsize=32)
-def fit_patch(settings: FitSettings = FitSettings()) -> FittedPatch:  # noqa: B008
+def fit_patch(settings: FitSettings = FitSettings()) -> FittedPatch:
     """Fit the gyroid's semi-fundamental patch.
 
     Parameters
@@ -161,20 +163,23 @@ def fit_report(fitted: FittedPatch) -> FitReport:
     fitted surface (Newton's method); the angle is that between the two normals there.
     """
     n = fitted.settings.control_points
-    samples = np.linspace(-1, 1, min(12 * (n - DEGREE) + 1, _MOST_REPORT_SAMPLES))
+    samples = np.linspace(-1, 1, min(_REPORT_SAMPLES_PER_SPAN * (n - DEGREE) + 1, _MOST_REPORT_SAMPLES))
     u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
     exact = PARAMETERISATIONS[fitted.settings.parameterisation]
     points, normals = exact(u, v)
     distance = np.zeros(len(u))
     foot_u, foot_v = u.copy(), v.copy()
-    for _ in range(4):
+    for _ in range(_FOOT_POINT_STEPS):
         d = fitted.surface.derivatives(foot_u, foot_v)
         residual = points + distance[:, np.newaxis] * normals - d[0, 0]
         jacobian = np.stack([d[1, 0], d[0, 1], -normals], axis=-1)
         step = np.linalg.solve(jacobian, residual[..., np.newaxis])[..., 0]
         foot_u, foot_v, distance = foot_u + step[:, 0], foot_v + step[:, 1], distance + step[:, 2]
+        # Newton's steps square: after one this small nothing is left to gain.
+        if np.max(np.abs(step)) < 1e-8:
+            break
     sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
-    curvature = fitted.surface.mean_curvature(u, v) * _CELL_SIZE
+    curvature = fitted.surface.mean_curvature(samples[:, np.newaxis], samples[np.newaxis]) * _CELL_SIZE
     at_corners = fitted.surface.evaluate(*parameter_corners().T)
     return FitReport(
         max_distance=float(np.max(np.abs(distance))) / _CELL_SIZE,
@@ -229,8 +234,9 @@ def _fit_staged(settings: FitSettings) -> Floats:
     net = np.zeros((n, n, 6))
     for k, (u, v) in enumerate(parameter_corners()):
         edge_row(net, k)[0] = np.concatenate(exact(u, v), axis=-1)
-    square = {0: (samples, -1.0), 1: (1.0, samples), 2: (-samples, 1.0), 3: (-1.0, -samples)}
-    for k, (u, v) in square.items():
+    ones = np.ones_like(samples)
+    square = ((samples, -ones), (ones, samples), (-samples, ones), (-ones, -samples))
+    for k, (u, v) in enumerate(square):
         rational = functions * edge_row(weights, k)
         rational /= rational.sum(axis=1, keepdims=True)
         row = edge_row(net, k)
@@ -272,7 +278,7 @@ def _rational_rows(along_u: Floats, along_v: Floats, weights: Floats) -> Floats:
 def _least_squares(rows: Floats, wanted: Floats, sample_weights: Floats) -> Floats:
     """Eqs. (12), (13), with one weight a sample: (R^T W R)^-1 R^T W S."""
     weighted = rows.T * sample_weights
-    return np.linalg.solve(weighted @ rows, weighted @ wanted)
+    return np.asarray(np.linalg.solve(weighted @ rows, weighted @ wanted), dtype=float)
 
 
 def _validated_knots(knots: tuple[float, ...], control_points: int) -> tuple[float, ...]:

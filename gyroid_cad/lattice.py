@@ -157,7 +157,7 @@ class Lattice:
 
     def bounding_box(self) -> tuple[Corner, Corner]:
         """Lowest and highest corner of the box round the wall, in mm."""
-        low, high = self.wall().bounding_box()
+        low, high = (corner.tolist() for corner in self.wall().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:

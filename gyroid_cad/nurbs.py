@@ -6,6 +6,8 @@ Algorithms after Piegl and Tiller, The NURBS Book (2nd ed.); numbers such as A2.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import prod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,6 +61,12 @@ def basis(knots: Floats, degree: int, parameters: ArrayLike, derivative: int = 0
     return functions
 
 
+@lru_cache
+def _gauss_rule(count: int) -> tuple[Floats, Floats]:
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return nodes, weights
+
+
 def gauss_points(knots: Floats, per_span: int) -> tuple[Floats, Floats]:
     """Gauss-Legendre points and weights on every span of a knot vector.
 
@@ -72,7 +80,7 @@ def gauss_points(knots: Floats, per_span: int) -> tuple[Floats, Floats]:
     -------
     points, weights : ndarray, shape (spans * per_span,)
     """
-    nodes, weights = np.polynomial.legendre.leggauss(per_span)
+    nodes, weights = _gauss_rule(per_span)
     breaks = np.unique(knots)
     half = np.diff(breaks)[:, np.newaxis] / 2
     middle = (breaks[1:, np.newaxis] + breaks[:-1, np.newaxis]) / 2
@@ -144,11 +152,11 @@ class NurbsSurface:
 
     @property
     def degree_u(self) -> int:
-        return len(self.knots_u) - self.control_points.shape[0] - 1
+        return len(self.knots_u) - int(self.control_points.shape[0]) - 1
 
     @property
     def degree_v(self) -> int:
-        return len(self.knots_v) - self.control_points.shape[1] - 1
+        return len(self.knots_v) - int(self.control_points.shape[1]) - 1
 
     @property
     def rational(self) -> bool:
@@ -167,7 +175,7 @@ class NurbsSurface:
         -------
         ndarray, shape (*broadcast, 3)
         """
-        return self.derivatives(u, v, order=0)[0, 0]
+        return np.asarray(self.derivatives(u, v, order=0)[0, 0])
 
     def derivatives(self, u: ArrayLike, v: ArrayLike, order: int = 1) -> Floats:
         """Points and partial derivatives at pairs (u, v) (A4.4).
@@ -175,7 +183,7 @@ class NurbsSurface:
         Parameters
         ----------
         u, v : array_like
-            Broadcast against each other.
+            Broadcast against each other; a grid given open, shapes (m, 1) and (1, k), costs far less.
         order : int
             0, 1 or 2: highest total order wanted.
 
@@ -184,16 +192,22 @@ class NurbsSurface:
         ndarray, shape (order + 1, order + 1, *broadcast, 3)
             ``[k, l]`` holds d^(k+l)S / du^k dv^l; entries with k + l > order are zero.
         """
-        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
+        u, v = np.asarray(u, float), np.asarray(v, float)
+        shape = np.broadcast_shapes(u.shape, v.shape)
+        if u.ndim == v.ndim == 2 and u.shape[1] == v.shape[0] == 1:
+            subscripts = "pjc,qj->pqc"
+        else:
+            u, v = np.broadcast_arrays(u, v)
+            subscripts = "pjc,pj->pc"
         along_u = [basis(self.knots_u, self.degree_u, u.ravel(), k) for k in range(order + 1)]
         along_v = [basis(self.knots_v, self.degree_v, v.ravel(), k) for k in range(order + 1)]
         homogeneous = _homogeneous(self.control_points, self.weights)
         rows = [(b @ homogeneous.reshape(len(homogeneous), -1)).reshape(u.size, -1, 4) for b in along_u]
-        numerator = np.zeros((order + 1, order + 1, u.size, 4))
+        numerator = np.zeros((order + 1, order + 1, prod(shape), 4))
         for k in range(order + 1):
             for m in range(order + 1 - k):
-                numerator[k, m] = np.einsum("pjc,pj->pc", rows[k], along_v[m])
-        return _quotient(numerator, order).reshape(order + 1, order + 1, *u.shape, 3)
+                numerator[k, m] = np.einsum(subscripts, rows[k], along_v[m], optimize=True).reshape(-1, 4)
+        return _quotient(numerator, order).reshape(order + 1, order + 1, *shape, 3)
 
     def normals(self, u: ArrayLike, v: ArrayLike) -> Floats:
         """Unit normals dS/du x dS/dv / |...|, the paper's eq. (20); shape (*broadcast, 3)."""
@@ -207,9 +221,8 @@ class NurbsSurface:
         su, sv = d[1, 0], d[0, 1]
         cross = np.cross(su, sv)
         normal = cross / np.linalg.norm(cross, axis=-1, keepdims=True)
-        dot = lambda a, b: np.sum(a * b, axis=-1)  # noqa: E731
-        e, f, g = dot(su, su), dot(su, sv), dot(sv, sv)
-        second_uu, second_uv, second_vv = dot(d[2, 0], normal), dot(d[1, 1], normal), dot(d[0, 2], normal)
+        e, f, g = _dot(su, su), _dot(su, sv), _dot(sv, sv)
+        second_uu, second_uv, second_vv = _dot(d[2, 0], normal), _dot(d[1, 1], normal), _dot(d[0, 2], normal)
         return np.asarray((e * second_vv - 2 * f * second_uv + g * second_uu) / (2 * (e * g - f * f)))
 
     def edge(self, index: int) -> NurbsCurve:
@@ -230,6 +243,10 @@ class NurbsSurface:
 def edge_row(net: Floats, index: int) -> Floats:
     """The row of a net (its first two axes) that controls border curve ``index``, in running order."""
     return (net[:, 0], net[-1, :], net[::-1, -1], net[0, ::-1])[index]
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.sum(a * b, axis=-1))
 
 
 def _homogeneous(control_points: Floats, weights: Floats) -> Floats:

@@ -52,6 +52,8 @@ EDGE_HALF_TURN = np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0]])
 EDGE_HALF_TURN_SHIFT = np.array([-0.25, 0.5, 0.25])
 
 _ARC_HALF_ANGLE = pi / 12
+# Along its axis the patch is seen over the square with corners (+-sqrt(2)/4, +-sqrt(2)/4).
+_HALF_SQUARE = sqrt(2) / 4
 _NEWTON_STEPS = 12
 # Convergence is quadratic: after a step this small the error is below rounding.
 _NEWTON_TOLERANCE = 1e-10
@@ -184,15 +186,13 @@ def _plan(u: Floats, v: Floats) -> Floats:
     right = rotoinversion(at_v, 2)[:, :2]
     top = rotoinversion(at_minus_u, 3)[:, :2]
     corners = [rotoinversion(_edge(np.array([1.0]))[0], k)[:2] for k in range(4)]
-    a, b, c, d = ((1 - u) / 2, (1 + u) / 2, (1 - v) / 2, (1 + v) / 2)
-    weigh = lambda weight, vectors: weight[:, np.newaxis] * vectors  # noqa: E731
-    plan = weigh(a, left) + weigh(b, right) + weigh(c, bottom) + weigh(d, top)
-    plan -= weigh(a * c, corners[0]) + weigh(b * c, corners[1])
-    plan -= weigh(b * d, corners[2]) + weigh(a * d, corners[3])
+    a, b, c, d = (weight[:, np.newaxis] for weight in ((1 - u) / 2, (1 + u) / 2, (1 - v) / 2, (1 + v) / 2))
+    plan = a * left + b * right + c * bottom + d * top
+    plan -= a * c * corners[0] + b * c * corners[1] + b * d * corners[2] + a * d * corners[3]
     # x + iy turns like v + iu: the rotoinversion takes (x, y) to (y, -x) and (u, v) to (-v, u).
     position = v + 1j * u
     shift = (1 - u * u) * (1 - v * v) * (_RADIAL_SHIFT * position + 1j * _CUBIC_SHIFT * np.conj(position) ** 3)
-    return plan + np.stack([shift.real, shift.imag], axis=-1)
+    return np.asarray(plan + np.stack([shift.real, shift.imag], axis=-1))
 
 
 def _lift(plan: Floats) -> tuple[Floats, Floats]:
@@ -218,7 +218,7 @@ def _lift(plan: Floats) -> tuple[Floats, Floats]:
 def _solve_corner_chart(x: Floats, y: Floats) -> Complexes:
     """Newton's method for the chart value above (x, y) in the sector of corner c."""
     coefficients = _inverse_chart()
-    tau = np.polynomial.polynomial.polyval2d(x, y, coefficients)
+    tau = np.polynomial.polynomial.polyval2d(x / _HALF_SQUARE, y / _HALF_SQUARE, coefficients)
     for _ in range(_NEWTON_STEPS):
         position = corner_chart_points(tau)
         tangent = corner_chart_tangents(tau)
@@ -233,13 +233,13 @@ def _solve_corner_chart(x: Floats, y: Floats) -> Complexes:
 
 
 @lru_cache(maxsize=1)
-def _inverse_chart(degree: int = 6) -> Complexes:
+def _inverse_chart(degree: int = 4) -> Complexes:
     """Polynomial coefficients of tau(x, y), fitted to exact samples of the sector: Newton's start."""
     half_arc = np.exp(1j * pi / 4) * (sqrt(2) * np.exp(1j * _ARC_HALF_ANGLE * np.linspace(-1, 0, 8)) - 1)
     arc = np.concatenate([half_arc, np.conj(half_arc)])
     omega = np.linspace(0, 1, 13)[:, np.newaxis] * arc
     tau = np.sqrt(1 - omega / CORNER).ravel()
     x, y, _ = corner_chart_points(tau).T
-    vandermonde = np.polynomial.polynomial.polyvander2d(x, y, [degree, degree])
-    solution = np.linalg.lstsq(vandermonde.astype(complex), tau, rcond=1e-10)[0]
+    powers = np.polynomial.polynomial.polyvander2d(x / _HALF_SQUARE, y / _HALF_SQUARE, [degree, degree])
+    solution = np.linalg.solve(powers.T @ powers, powers.T @ tau)
     return np.asarray(solution.reshape(degree + 1, degree + 1))

@@ -71,7 +71,7 @@ class Placements:
         Proper motions of the gyroid keep its two sides, improper ones exchange them, so the sign is the
         determinant.
         """
-        return np.rint(np.linalg.det(self.matrices)).astype(np.int64)
+        return np.asarray(np.rint(np.linalg.det(self.matrices)), dtype=np.int64)
 
     def transformed(self, matrix: Integers, translation: tuple[int, int, int]) -> Placements:
         """Follow every placement by p -> matrix p + translation (in quarters)."""
@@ -84,7 +84,7 @@ class Placements:
 
 def bounding_cell() -> Placements:
     """The six patches of eqs. (15) to (17), which meet at (1/2, 1/2, 1/2)."""
-    first = Placements(np.eye(3)[np.newaxis], np.array([[4, 2, 1]]), np.zeros(1))
+    first = Placements(np.eye(3, dtype=np.int64)[np.newaxis], np.array([[4, 2, 1]]), np.zeros(1, dtype=np.int64))
     patches = [first]
     for _ in range(5):
         patches.append(patches[-1].transformed(_D, (0, 0, _A)))

@@ -88,14 +88,13 @@ class Wall:
 
     def _patch_volume(self, net: int) -> float:
         points, weights = gauss_points(self.knots, _VOLUME_POINTS_PER_SPAN)
-        u, v = (grid.ravel() for grid in np.meshgrid(points, points, indexing="ij"))
+        u, v = points[:, np.newaxis], points[np.newaxis]
         below, above = (self.face(net, side).derivatives(u, v) for side in SIDES)
         through = above[0, 0] - below[0, 0]
-        area_weights = np.outer(weights, weights).ravel()
         total = 0.0
         for height, height_weight in zip(*gauss_points(np.array([0.0, 1.0]), 2), strict=True):
             du, dv = ((1 - height) * below[i] + height * above[i] for i in ((1, 0), (0, 1)))
-            total += height_weight * float(area_weights @ np.einsum("pi,pi->p", np.cross(du, dv), through))
+            total += height_weight * float(weights @ np.sum(np.cross(du, dv) * through, axis=-1) @ weights)
         return total
 
 
@@ -123,9 +122,7 @@ def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thick
     placements = complex.placements
     half = thickness / 2 / bounding_cell_length
     nets = []
-    for matrix, translation, sign in zip(
-        placements.matrices, placements.translations, placements.sides, strict=True
-    ):
+    for matrix, translation, sign in zip(placements.matrices, placements.translations, placements.sides, strict=True):
         faces = [
             patch.offset(sign * side * half).transformed(matrix, translation * QUARTER).control_points
             for side in (-1, 1)
@@ -136,7 +133,7 @@ def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thick
         complex=complex,
         nets=np.stack(nets),
         patch_net=complex.patch_placement,
-        shifts=cells * cell_size,
+        shifts=np.asarray(cells * cell_size, dtype=float),
         patch_shift=patch_shift.ravel(),
         weights=patch.surface.weights,
         knots=patch.surface.knots_u,
@@ -151,9 +148,7 @@ def _extent(surface: NurbsSurface, samples: int = 25, rounds: int = 4) -> tuple[
             centre_u = centre_v = 0.0
             reach = 1.0
             for _ in range(rounds):
-                u, v = (
-                    np.clip(centre + reach * np.linspace(-1, 1, samples), -1, 1) for centre in (centre_u, centre_v)
-                )
+                u, v = (np.clip(centre + reach * np.linspace(-1, 1, samples), -1, 1) for centre in (centre_u, centre_v))
                 values = _grid_coordinate(surface, u, v, axis)
                 i, j = np.unravel_index(best(values), values.shape)
                 centre_u, centre_v, reach = float(u[i]), float(v[j]), reach * 3 / samples

@@ -105,7 +105,7 @@ def normals(omega: ArrayLike) -> Floats:
     w = np.asarray(omega, dtype=complex)
     squared = np.abs(w) ** 2
     vectors = np.stack([2 * w.real, 2 * w.imag, squared - 1], axis=-1)
-    return vectors / (1 + squared)[..., np.newaxis]
+    return np.asarray(vectors / (1 + squared)[..., np.newaxis])
 
 
 def points(omega: ArrayLike, family: Family = GYROID) -> Floats:
@@ -212,7 +212,7 @@ def quadrature_point(omega: complex, family: Family = GYROID, digits: int = 30) 
         def integrand(component: int, s: object) -> object:
             w = end * (1 - s * s)  # type: ignore[operator]
             forms = (1 - w**2, 1j * (1 + w**2), 2 * w)
-            return forms[component] / mpmath.sqrt(w**8 - 14 * w**4 + 1) * 2 * s * end  # type: ignore[operator]
+            return forms[component] / mpmath.sqrt(w**8 - 14 * w**4 + 1) * 2 * s * end
 
         turn = family.scale * mpmath.expj(family.bonnet_angle)
         integrals = [mpmath.quad(lambda s, i=i: integrand(i, s), [0, 1]) for i in range(3)]

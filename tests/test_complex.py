@@ -184,7 +184,7 @@ def test_placements_that_pass_an_edge_to_three_patches_are_refused() -> None:
     thrice = Placements(
         np.concatenate([cell.matrices, cell.matrices[:1]]),
         np.concatenate([cell.translations, cell.translations[:1]]),
-        np.zeros(7),
+        np.zeros(7, dtype=np.int64),
     )
     with pytest.raises(ValueError, match="more than two patches"):
         build_complex((1, 1, 1), thrice)

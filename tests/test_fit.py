@@ -78,17 +78,15 @@ def test_the_reported_distance_is_that_of_the_nearest_points(fitted: FittedPatch
     u, v = (grid.ravel() for grid in np.meshgrid(*[np.linspace(-1, 1, 121)] * 2))
     exact, normals = smooth(u, v)
     along_normal = np.abs(np.sum((fitted.surface.evaluate(u, v) - exact) * normals, axis=1))
+
+    def apart(uv: Floats, target: Floats) -> Floats:
+        return np.asarray(fitted.surface.evaluate(uv[0], uv[1]) - target)
+
     nearest = []
     for sample in np.argsort(along_normal)[-8:]:
-        target, start = exact[sample], np.clip([u[sample], v[sample]], -0.999, 0.999)
-        result = least_squares(
-            lambda uv, target=target: fitted.surface.evaluate(*uv) - target,
-            start,
-            bounds=(-1, 1),
-            xtol=1e-14,
-            ftol=1e-14,
-            gtol=1e-14,
-        )
+        start = np.clip([u[sample], v[sample]], -0.999, 0.999)
+        tight = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
+        result = least_squares(apart, start, bounds=(-1, 1), args=(exact[sample],), **tight)
         nearest.append(np.linalg.norm(result.fun) / CELL_SIZE)
     assert max(nearest) == pytest.approx(fit_report(fitted).max_distance, rel=0.02)
 

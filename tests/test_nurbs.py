@@ -51,7 +51,7 @@ def uneven_surface() -> NurbsSurface:
 def cylinder(radius: float) -> NurbsSurface:
     """A quarter of a cylinder about z, u round it and v along it: du x dv points outwards."""
     arc = np.column_stack([radius * QUARTER_ARC, np.zeros(3)])
-    net = np.stack([arc, arc + [0, 0, 2.0]], axis=1)
+    net = np.stack([arc, arc + np.array([0, 0, 2.0])], axis=1)
     return NurbsSurface(net, np.column_stack([ARC_WEIGHTS] * 2), ARC_KNOTS, LINE_KNOTS)
 
 
@@ -191,7 +191,8 @@ def test_weights_all_alike_change_nothing() -> None:
 def test_edges_run_round_the_square() -> None:
     surface = uneven_surface()
     u, v = np.linspace(-1, 1, 17), np.linspace(0, 3, 17)
-    border = [(u, 0.0), (1.0, v), (u[::-1], 3.0), (-1.0, v[::-1])]
+    one = np.ones_like(u)
+    border = [(u, 0 * one), (one, v), (u[::-1], 3 * one), (-one, v[::-1])]
     for k, (along_u, along_v) in enumerate(border):
         curve, following = surface.edge(k), surface.edge((k + 1) % 4)
         np.testing.assert_allclose(
@@ -201,7 +202,7 @@ def test_edges_run_round_the_square() -> None:
 
 
 def test_edge_rows_of_a_net_meet_end_to_start() -> None:
-    net = np.arange(20).reshape(5, 4)
+    net = np.arange(20.0).reshape(5, 4)
     rows = [edge_row(net, k) for k in range(4)]
     assert [row[-1] for row in rows] == [row[0] for row in rows[1:] + rows[:1]]
     assert {int(i) for row in rows for i in row} == set(net.ravel().tolist()) - set(net[1:-1, 1:-1].ravel().tolist())

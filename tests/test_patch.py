@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import pi, sqrt
 
 import numpy as np
@@ -124,8 +125,12 @@ def test_both_parameterisations_have_the_same_edges() -> None:
 @pytest.mark.parametrize(("u", "v"), [(0, 0), (0.5, 0.1), (-0.9, 0.2), (0.3, 0.8), (-0.7, -0.7), (0.95, -0.9)])
 def test_both_parameterisations_lie_on_one_surface(u: float, v: float) -> None:
     point, normal = polar(u, v)
-    below = root(lambda uv: smooth(*uv)[0][:2] - point[:2], [u, v], tol=1e-14).x
-    on_smooth, smooth_normal = smooth(*below)
+
+    def apart_in_the_view(uv: Floats) -> Floats:
+        return np.asarray(smooth(uv[0], uv[1])[0][:2] - point[:2])
+
+    below = root(apart_in_the_view, [u, v], tol=1e-14).x
+    on_smooth, smooth_normal = smooth(below[0], below[1])
     np.testing.assert_allclose(on_smooth, point, rtol=0, atol=1e-12)
     np.testing.assert_allclose(smooth_normal, normal, rtol=0, atol=1e-11)
 
@@ -180,7 +185,7 @@ def test_quadrature_of_the_smooth_patch_converges_geometrically() -> None:
         return abs(float(area) * PATCHES_PER_CELL * AREAS_PER_CELL_SIZE_SQUARED - AREA_PER_CELL)
 
     errors = [area_error(count) for count in (8, 12, 16, 20)]
-    assert all(later < earlier / 20 for earlier, later in zip(errors, errors[1:], strict=False))
+    assert all(later < earlier / 20 for earlier, later in pairwise(errors))
 
 
 def _coefficients(points: Floats) -> Floats:

@@ -56,7 +56,9 @@ def as_printed() -> Placements:
 
 def placed_edge(placements: Placements, patch: int, k: int) -> tuple[Floats, Floats]:
     """Exact points, in bounding-cell lengths, and normals to the common side along an edge."""
-    points, normals = smooth(*[(ALONG, -1), (1, ALONG), (-ALONG, 1), (-1, -ALONG)][k])
+    one = np.ones_like(ALONG)
+    u, v = [(ALONG, -one), (one, ALONG), (-ALONG, one), (-one, -ALONG)][k]
+    points, normals = smooth(u, v)
     matrix, translation = placements.matrices[patch], placements.translations[patch] * QUARTER
     return points @ matrix.T + translation, placements.sides[patch] * normals @ matrix.T
 

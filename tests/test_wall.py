@@ -47,7 +47,8 @@ def enclosed(wall: Wall) -> tuple[Floats, float]:
     total = np.zeros(4)
     for patch, net in enumerate(wall.patch_net):
         free = np.flatnonzero(wall.complex.free[wall.complex.patch_edges[patch]])
-        through = per_face[net][1] - per_face[net][0] + sum(flux(wall.side_wall(net, k)) for k in free)
+        borders = [flux(wall.side_wall(int(net), int(k))) for k in free]
+        through = np.sum([per_face[net][1], -per_face[net][0], *borders], axis=0)
         total += through
         total[3] += wall.shifts[wall.patch_shift[patch]] @ through[:3]
     return total[:3], float(total[3]) / 3
@@ -62,13 +63,14 @@ def edge_points(wall: Wall, patch: int, edge: int, side: int, along: Floats) -> 
     k = local_edge(wall, patch, edge)
     curve = wall.face(wall.patch_net[patch], side).edge(k)
     points = curve.evaluate(along if wall.complex.edge_forward[patch, k] else -along)
-    return points + wall.shifts[wall.patch_shift[patch]]
+    return np.asarray(points + wall.shifts[wall.patch_shift[patch]])
 
 
 def densely(surface: NurbsSurface, count: int) -> Floats:
     """A grid of points of a polynomial surface, ends included; shape (count**2, 3)."""
     functions = basis(surface.knots_u, 3, np.linspace(-1, 1, count))
-    return np.einsum("ui,ijc,vj->uvc", functions, surface.control_points, functions, optimize=True).reshape(-1, 3)
+    grid = np.einsum("ui,ijc,vj->uvc", functions, surface.control_points, functions, optimize=True)
+    return np.asarray(grid.reshape(-1, 3))
 
 
 @pytest.mark.parametrize("relative_thickness", [0.01, 0.05, 0.1, 0.2, 0.3, 0.37])
@@ -125,7 +127,7 @@ def test_side_walls_join_the_borders_of_both_faces() -> None:
 def test_neighbours_share_the_edges_of_both_faces(cells: tuple[int, int, int]) -> None:
     wall = wall_of(cells)
     along = np.linspace(-1, 1, 7)
-    for edge in np.flatnonzero(~wall.complex.free):
+    for edge in np.flatnonzero(~wall.complex.free).tolist():
         first, second = wall.complex.edge_patches[edge]
         for side in SIDES:
             here, there = (edge_points(wall, patch, edge, side, along) for patch in (first, second))

@@ -106,10 +106,9 @@ def _flux(surface: Geom_BSplineSurface) -> tuple[float, Floats]:
     nurbs = nurbs_of_surface(surface)
     u_points, u_weights = gauss_points(nurbs.knots_u, _FLUX_POINTS_PER_SPAN)
     v_points, v_weights = gauss_points(nurbs.knots_v, _FLUX_POINTS_PER_SPAN)
-    u, v = (grid.ravel() for grid in np.meshgrid(u_points, v_points, indexing="ij"))
-    d = nurbs.derivatives(u, v)
-    area = np.cross(d[1, 0], d[0, 1]) * np.outer(u_weights, v_weights).reshape(-1, 1)
-    return float(np.sum(d[0, 0] * area)) / 3, area.sum(axis=0)
+    d = nurbs.derivatives(u_points[:, np.newaxis], v_points[np.newaxis])
+    area = np.cross(d[1, 0], d[0, 1]) * np.outer(u_weights, v_weights)[..., np.newaxis]
+    return float(np.sum(d[0, 0] * area)) / 3, area.sum(axis=(0, 1))
 
 
 def _count(shape: TopoDS_Shape, kind: object) -> int:

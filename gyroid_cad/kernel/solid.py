@@ -136,7 +136,9 @@ class _Realisation:
         net, shift = self.wall.patch_net[patch], self.wall.shifts[self.wall.patch_shift[patch]]
         vertices: list[list[TopoDS_Vertex]] = []
         for side in SIDES:
-            corner_points = np.stack([self.wall.nets[:, side][(slice(None), *_CORNER_INDEX[k])] for k in range(corners)], axis=1)
+            corner_points = np.stack(
+                [self.wall.nets[:, side][(slice(None), *_CORNER_INDEX[k])] for k in range(corners)], axis=1
+            )
             made = []
             for point in (corner_points[net, corner] + shift).tolist():
                 vertex = TopoDS_Vertex()

@@ -60,7 +60,7 @@ def write_step(
     """
     kernel_schema = require_schema(schema)
     product = Path(path).stem if name is None else name
-    settings = {
+    settings: dict[str, str | int] = {
         "write.step.schema": kernel_schema,
         "write.step.unit": "MM",
         "write.step.product.name": product,

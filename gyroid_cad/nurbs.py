@@ -18,6 +18,11 @@ __all__ = ["NurbsCurve", "NurbsSurface", "basis", "edge_row", "gauss_points", "u
 
 Floats = NDArray[np.float64]
 
+# S . (dS/du x dS/dv) of a cubic surface has degree 8 on each span. A quotient is no polynomial: with the
+# paper's weights, which vary sixfold, so many points leave 1e-12.
+_CUBIC_POINTS_PER_SPAN = 5
+_RATIONAL_POINTS_PER_SPAN = 24
+
 
 def uniform_knots(control_points: int, degree: int = 3) -> Floats:
     """Clamped knot vector on [-1, 1] with evenly spaced inner knots; shape (control_points + degree + 1,)."""
@@ -224,6 +229,20 @@ class NurbsSurface:
         e, f, g = _dot(su, su), _dot(su, sv), _dot(sv, sv)
         second_uu, second_uv, second_vv = _dot(d[2, 0], normal), _dot(d[1, 1], normal), _dot(d[0, 2], normal)
         return np.asarray((e * second_vv - 2 * f * second_uv + g * second_uu) / (2 * (e * g - f * f)))
+
+    def quadrature(self) -> tuple[Floats, Floats, Floats]:
+        """Points and weights that integrate fluxes and volumes of the surface to rounding.
+
+        Returns
+        -------
+        u : ndarray, shape (m, 1)
+        v : ndarray, shape (1, k)
+        weights : ndarray, shape (m, k)
+        """
+        per_span = _RATIONAL_POINTS_PER_SPAN if self.rational else _CUBIC_POINTS_PER_SPAN
+        u, u_weights = gauss_points(self.knots_u, per_span)
+        v, v_weights = gauss_points(self.knots_v, per_span)
+        return u[:, np.newaxis], v[np.newaxis], np.outer(u_weights, v_weights)
 
     def edge(self, index: int) -> NurbsCurve:
         """Border curve ``index``, run round the square: v = -1, u = 1, v = 1 backwards, u = -1 backwards."""

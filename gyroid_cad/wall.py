@@ -23,8 +23,6 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SIDES = (0, 1)
-# The volume of a cubic patch is a polynomial of degree 8 along u and v and 2 across the wall.
-_VOLUME_POINTS_PER_SPAN = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,14 +85,13 @@ class Wall:
         return (low[self.patch_net] + shift).min(axis=0), (high[self.patch_net] + shift).max(axis=0)
 
     def _patch_volume(self, net: int) -> float:
-        points, weights = gauss_points(self.knots, _VOLUME_POINTS_PER_SPAN)
-        u, v = points[:, np.newaxis], points[np.newaxis]
+        u, v, weights = self.face(net, 0).quadrature()
         below, above = (self.face(net, side).derivatives(u, v) for side in SIDES)
         through = above[0, 0] - below[0, 0]
         total = 0.0
         for height, height_weight in zip(*gauss_points(np.array([0.0, 1.0]), 2), strict=True):
             du, dv = ((1 - height) * below[i] + height * above[i] for i in ((1, 0), (0, 1)))
-            total += height_weight * float(weights @ np.sum(np.cross(du, dv) * through, axis=-1) @ weights)
+            total += height_weight * float(np.sum(weights * np.sum(np.cross(du, dv) * through, axis=-1)))
         return total
 
 

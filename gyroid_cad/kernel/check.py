@@ -17,14 +17,10 @@ from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
-from gyroid_cad.nurbs import gauss_points
 
 __all__ = ["Topology", "enclosed_volume", "is_valid", "topology"]
 
 Floats = NDArray[np.float64]
-
-# A rational or cubic face's flux integrand; exact for cubics (degree 8).
-_FLUX_POINTS_PER_SPAN = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +100,9 @@ def enclosed_volume(shape: TopoDS_Shape) -> float:
 def _flux(surface: Geom_BSplineSurface) -> tuple[float, Floats]:
     """Flux of p/3 through the surface, and its area vector, both towards du x dv."""
     nurbs = nurbs_of_surface(surface)
-    u_points, u_weights = gauss_points(nurbs.knots_u, _FLUX_POINTS_PER_SPAN)
-    v_points, v_weights = gauss_points(nurbs.knots_v, _FLUX_POINTS_PER_SPAN)
-    d = nurbs.derivatives(u_points[:, np.newaxis], v_points[np.newaxis])
-    area = np.cross(d[1, 0], d[0, 1]) * np.outer(u_weights, v_weights)[..., np.newaxis]
+    u, v, weights = nurbs.quadrature()
+    d = nurbs.derivatives(u, v)
+    area = np.cross(d[1, 0], d[0, 1]) * weights[..., np.newaxis]
     return float(np.sum(d[0, 0] * area)) / 3, area.sum(axis=(0, 1))
 
 

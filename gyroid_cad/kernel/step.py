@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 
@@ -105,6 +106,10 @@ def _fill_header(writer: STEPControl_Writer, product: str) -> None:
     header.SetDescriptionValue(1, text("gyroid lattice"))
     header.SetOriginatingSystem(text(f"gyroid_cad {__version__}"))
     header.SetAuthorisation(text(""))
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if epoch.isdigit():
+        # The convention for reproducible builds: the file's date is the one given, in UTC.
+        header.SetTimeStamp(text(datetime.fromtimestamp(int(epoch), UTC).strftime("%Y-%m-%dT%H:%M:%S")))
 
 
 @contextmanager

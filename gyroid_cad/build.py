@@ -7,6 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -84,6 +85,12 @@ class Build:
         yield
         _tell(progress, stage, 1, 1)
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+
+    @cached_property
+    def bounding_box(self) -> tuple[list[float], list[float]]:
+        """Lowest and highest corner of the box round the wall, in mm."""
+        low, high = self.wall.bounding_box()
+        return low.tolist(), high.tolist()
 
     def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""

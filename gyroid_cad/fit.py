@@ -122,6 +122,10 @@ class FittedPatch:
         net = self.surface.control_points + distance * self.normals.control_points
         return NurbsSurface(net, self.surface.weights, self.surface.knots_u, self.surface.knots_v)
 
+    def report(self) -> FitReport:
+        """What the fit is worth, measured once; see :func:`fit_report`."""
+        return fit_report(self)
+
 
 @dataclass(frozen=True, slots=True)
 class FitReport:
@@ -242,14 +246,31 @@ def _fit_staged(settings: FitSettings) -> Floats:
         row = edge_row(net, k)
         known = rational[:, [0, -1]] @ row[[0, -1]]
         row[1:-1] = _least_squares(rational[:, 1:-1], np.concatenate(exact(u, v), axis=-1) - known, sample_weights)
-    u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
-    rational = _rational_rows(functions, functions, weights)
     inner = np.zeros((n, n), dtype=bool)
     inner[1:-1, 1:-1] = True
+    rational = _rational_rows(functions, functions, weights)
     known = rational[:, ~inner.ravel()] @ net[~inner]
-    wanted = np.concatenate(exact(u, v), axis=-1) - known
-    net[inner] = _least_squares(rational[:, inner.ravel()], wanted, np.outer(sample_weights, sample_weights).ravel())
+    u, v = samples[:, np.newaxis], samples[np.newaxis]
+    wanted = np.concatenate(exact(u, v), axis=-1).reshape(-1, 6) - known
+    quadrature = np.outer(sample_weights, sample_weights).ravel()
+    rational = rational[:, inner.ravel()]
+    net[inner] = _least_squares(rational, wanted, quadrature)
+
+    derivatives = NurbsSurface(net[..., :3], weights, knots, knots).derivatives(u, v)
+    area = np.cross(derivatives[1, 0], derivatives[0, 1]).reshape(-1, 3)
+    net[inner, 3:] += _missing_normals(rational, quadrature, area, (known + rational @ net[inner])[:, 3:])
     return net
+
+
+def _missing_normals(rational: Floats, quadrature: Floats, area: Floats, normals: Floats) -> Floats:
+    """What the inner control points of the normals lack to carry the surface's whole area.
+
+    Least squares leave the sum of N . dA short by 7.5e-7 of the area at 10 x 10, and every wall's volume with
+    it. The missing part is spread along the area vectors; edges, which neighbours share, keep theirs.
+    """
+    spread = _least_squares(rational, area, quadrature)
+    shortage = quadrature @ (np.linalg.norm(area, axis=1) - np.sum(normals * area, axis=1))
+    return np.asarray(spread * (shortage / (quadrature @ np.sum(rational @ spread * area, axis=1))))
 
 
 def _fit_cloud(settings: FitSettings) -> Floats:

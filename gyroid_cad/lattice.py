@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from gyroid_cad.build import Build, Progress, build, require_formats, require_settings
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fit import FitSettings, fit_patch, fit_report
-from gyroid_cad.tube import DENSITY_LIMIT, THICKNESS_LIMIT, density_of_thickness, thickness_of_density
+from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class Lattice:
 
     def bounding_box(self) -> tuple[Corner, Corner]:
         """Lowest and highest corner of the box round the wall, in mm."""
-        low, high = (corner.tolist() for corner in self.wall().bounding_box())
+        low, high = self._build().bounding_box
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:
@@ -249,22 +249,22 @@ class Lattice:
 
     def _require_sound_wall(self) -> None:
         if self.density is not None:
-            if not 0 < self.density < DENSITY_LIMIT:
+            if not 0 < self.density < LARGEST_DENSITY:
                 raise ParameterError(
-                    "density", self.density, f"above 0 and below {DENSITY_LIMIT:.5f}, where the wall meets itself"
+                    "density", self.density, f"above 0 and below {LARGEST_DENSITY:.5f}, where the wall meets itself"
                 )
             if self.wall_thickness < THINNEST_WALL:
                 thinnest = density_of_thickness(THINNEST_WALL / self.cell_size)
                 raise ParameterError("density", self.density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
             return
         assert self.thickness is not None
-        limit = THICKNESS_LIMIT * self.cell_size
+        limit = LARGEST_THICKNESS * self.cell_size
         if not THINNEST_WALL <= self.thickness < limit:
             raise ParameterError(
                 "thickness",
                 self.thickness,
                 f"{THINNEST_WALL:g} mm or more and below {limit:.5g} mm, "
-                f"the curvature limit {THICKNESS_LIMIT:.5f} x cell_size",
+                f"the curvature limit {LARGEST_THICKNESS:.5f} x cell_size",
             )
 
 

@@ -13,8 +13,9 @@ from gyroid_cad.weierstrass import GYROID, K_PRIME, K
 
 __all__ = [
     "AREA_PER_CELL",
-    "DENSITY_LIMIT",
     "EULER_CHARACTERISTIC",
+    "LARGEST_DENSITY",
+    "LARGEST_THICKNESS",
     "THICKNESS_LIMIT",
     "density_of_thickness",
     "face_area",
@@ -26,6 +27,9 @@ AREA_PER_CELL = 1.5 * (K / K_PRIME + K_PRIME / K)
 EULER_CHARACTERISTIC = -8
 # Twice the smallest radius of curvature, scale a / 2 at the patch's centre, with a = L / 2.
 THICKNESS_LIMIT = GYROID.scale / 2
+# How much of that radius a fitted patch is trusted with: its deviation takes a few millionths.
+_SOUNDNESS_MARGIN = 1e-5
+LARGEST_THICKNESS = THICKNESS_LIMIT * (1 - _SOUNDNESS_MARGIN)
 _CUBIC = -2 * pi * EULER_CHARACTERISTIC / 12
 
 
@@ -44,7 +48,7 @@ def density_of_thickness(thickness: float) -> float:
     return AREA_PER_CELL * thickness - _CUBIC * thickness**3
 
 
-DENSITY_LIMIT = density_of_thickness(THICKNESS_LIMIT)
+LARGEST_DENSITY = density_of_thickness(LARGEST_THICKNESS)
 
 
 def thickness_of_density(density: float) -> float:
@@ -53,7 +57,7 @@ def thickness_of_density(density: float) -> float:
     Parameters
     ----------
     density : float
-        From 0 to DENSITY_LIMIT.
+        From 0 to LARGEST_DENSITY.
 
     Returns
     -------

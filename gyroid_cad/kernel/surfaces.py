@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
@@ -64,6 +66,12 @@ def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
 
 
 def _knots(vector: Floats) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+    return _knot_arrays(tuple(vector.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _knot_arrays(vector: tuple[float, ...]) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+    """Distinct knots and their multiplicities; the kernel copies them, so one pair serves all."""
     values, counts = np.unique(vector, return_counts=True)
     multiplicities = TColStd_Array1OfInteger(1, len(counts))
     for i, count in enumerate(counts.tolist(), 1):

@@ -48,8 +48,8 @@ def _print_peaks(cells: np.ndarray, measured: dict[str, np.ndarray]) -> None:
 def _print_slopes(cells: np.ndarray, measured: dict[str, np.ndarray]) -> None:
     lines = []
     for kind in _KINDS:
-        peak, size = (np.polynomial.Polynomial.fit(cells, column, 1).convert().coef for column in measured[kind].T)
-        lines.append((kind, f"{peak[0] / 1e6:.0f} MB", f"{peak[1] / 1e3:.0f} kB", f"{size[1] / 1e3:.0f} kB"))
+        peak, size = (np.polyfit(cells, column, 1) for column in measured[kind].T)
+        lines.append((kind, f"{peak[1] / 1e6:.0f} MB", f"{peak[0] / 1e3:.0f} kB", f"{size[0] / 1e3:.0f} kB"))
     plain_table("What a cell costs", ("up to", "before the first", "memory a cell", "file a cell"), lines)
 
 

@@ -1,4 +1,4 @@
-"""The lattice every benchmark builds (10 mm cells, a wall of 0.8 mm, the 10 x 10 fit), and the kernel calls it is set against."""
+"""The lattice every benchmark builds (10 mm cells, a 0.8 mm wall, the 10 x 10 fit), and the kernel calls beside it."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.symmetry import CELL_QUARTERS, Placements, cubic_cell, placed_corners
 
 __all__ = ["CellComplex", "build_complex"]
@@ -67,6 +68,9 @@ class CellComplex:
     fan_corner: Integers
     corner_quarters: Integers
     patch_component: Integers
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def patch_count(self) -> int:

@@ -23,7 +23,7 @@ class ParameterError(GyroidError, ValueError):
     """
 
     def __init__(self, parameter: str, value: object, accepted: str) -> None:
-        shown = repr(value)
+        shown = " ".join(repr(value).split())
         if len(shown) > 120:
             shown = shown[:117] + "..."
         super().__init__(f"{parameter} = {shown}: expected {accepted}")

@@ -25,7 +25,16 @@ from gyroid_cad.patch import (
     parameter_corners,
 )
 
-__all__ = ["FitReport", "FitSettings", "FittedPatch", "edge_gap", "fit_patch", "fit_report", "require_shared_edges"]
+__all__ = [
+    "FitReport",
+    "FitSettings",
+    "FittedPatch",
+    "edge_gap",
+    "fit_patch",
+    "fit_report",
+    "largest_offset",
+    "require_shared_edges",
+]
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +47,8 @@ _CLOUD_RADII = 48
 _REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
 _FOOT_POINT_STEPS = 4
+# Odd, so that the patch's centre, where it curves most, is among them.
+_FOLD_SAMPLES = 97
 # Lengths here are in bounding-cell lengths a; reports are in cell sizes L = 2 a.
 _CELL_SIZE = 2.0
 
@@ -73,7 +84,7 @@ class FitSettings:
             raise ParameterError("control_points", n, "a whole number")
         if not FEWEST_CONTROL_POINTS <= n <= MOST_CONTROL_POINTS:
             raise ParameterError("control_points", n, f"{FEWEST_CONTROL_POINTS} to {MOST_CONTROL_POINTS} a side")
-        if self.parameterisation not in PARAMETERISATIONS:
+        if self.parameterisation not in tuple(PARAMETERISATIONS):
             raise ParameterError("parameterisation", self.parameterisation, " or ".join(PARAMETERISATIONS))
         if self.knots is not None:
             object.__setattr__(self, "knots", _validated_knots(self.knots, n))
@@ -199,17 +210,30 @@ def fit_report(fitted: FittedPatch) -> FitReport:
 def edge_gap(fitted: FittedPatch) -> float:
     """Largest distance, in cell sizes, between an edge of the fit and the same edge of its neighbour.
 
-    The neighbour is the patch's image under the half-turn about the normal at the edge's midpoint,
-    which runs the edge backwards.
+    The neighbour is the patch's image under the half-turn about the normal at the edge's midpoint. It meets the edge
+    with one of its own, run backwards; which one depends on the placement, so every pair is compared.
     """
-    along = np.linspace(-1, 1, 201)
-    gaps = []
-    for k in range(4):
-        to_edge_3 = np.linalg.matrix_power(ROTOINVERSION, 3 - k)
-        edge = fitted.surface.edge(k).evaluate(along) @ to_edge_3.T
-        neighbours = edge[::-1] @ EDGE_HALF_TURN.T + EDGE_HALF_TURN_SHIFT
-        gaps.append(np.max(np.linalg.norm(edge - neighbours, axis=1)))
-    return float(max(gaps)) / _CELL_SIZE
+    return _gap(fitted.surface, EDGE_HALF_TURN_SHIFT) / _CELL_SIZE
+
+
+@lru_cache(maxsize=32)
+def largest_offset(fitted: FittedPatch) -> float:
+    """How far the fit can be offset to both sides before it folds over, in bounding-cell lengths.
+
+    The exact surface folds at its smallest radius of curvature; the fit a little before. Where it is
+    offset by s, its area vector along the normal is a + b s + c s^2; the smallest root over a dense grid counts.
+    """
+    samples = np.linspace(-1, 1, _FOLD_SAMPLES)
+    u, v = samples[:, np.newaxis], samples[np.newaxis]
+    surface, normals = fitted.surface.derivatives(u, v), fitted.normals.derivatives(u, v)
+    surface_u, surface_v = surface[1, 0], surface[0, 1]
+    n, normals_u, normals_v = normals[0, 0], normals[1, 0], normals[0, 1]
+    a = np.sum(np.cross(surface_u, surface_v) * n, axis=-1)
+    b = np.sum((np.cross(surface_u, normals_v) + np.cross(normals_u, surface_v)) * n, axis=-1)
+    c = np.sum(np.cross(normals_u, normals_v) * n, axis=-1)
+    # c < 0 < a on a saddle: one root on each side, the nearer one at this distance.
+    roots = 2 * a / (np.abs(b) + np.sqrt(np.maximum(b * b - 4 * a * c, 0)))
+    return float(roots.min())
 
 
 def require_shared_edges(fitted: FittedPatch) -> None:
@@ -221,12 +245,25 @@ def require_shared_edges(fitted: FittedPatch) -> None:
         Saying how far apart the edges are.
     """
     gap = edge_gap(fitted)
-    if gap > EDGE_GAP_LIMIT:
+    normals_gap = _gap(fitted.normals, np.zeros(3), turned_over=-1.0)
+    if max(gap, normals_gap) > EDGE_GAP_LIMIT:
         raise FitError(
             f"the edges of neighbouring patches are {gap:.2e} of the cell size apart in the "
-            f"{fitted.settings.parameterisation} parameterisation; a solid needs them within {EDGE_GAP_LIMIT:.0e}: "
-            "use the smooth one, with symmetric weights"
+            f"{fitted.settings.parameterisation} parameterisation, and their unit normals {normals_gap:.1e}; a solid "
+            f"needs both within {EDGE_GAP_LIMIT:.0e}: use the smooth one, with symmetric weights"
         )
+
+
+def _gap(surface: NurbsSurface, shift: Floats, turned_over: float = 1.0) -> float:
+    """Largest distance between any edge, brought to edge 3, and any other's half-turn there.
+
+    The rotoinversion that brings edge k to edge k + 1 turns normals over as well.
+    """
+    along = np.linspace(-1, 1, 201)
+    turn = turned_over * ROTOINVERSION
+    edges = [surface.edge(k).evaluate(along) @ np.linalg.matrix_power(turn, 3 - k).T for k in range(4)]
+    images = [edge[::-1] @ EDGE_HALF_TURN.T + shift for edge in edges]
+    return float(max(np.max(np.linalg.norm(edge - image, axis=1)) for edge in edges for image in images))
 
 
 def _fit_staged(settings: FitSettings) -> Floats:

@@ -12,6 +12,7 @@ from math import prod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
 
 __all__ = ["NurbsCurve", "NurbsSurface", "basis", "edge_row", "gauss_points", "uniform_knots"]
@@ -48,6 +49,8 @@ def basis(knots: Floats, degree: int, parameters: ArrayLike, derivative: int = 0
     """
     x = np.atleast_1d(np.asarray(parameters, float))
     count = len(knots) - degree - 1
+    if derivative > degree:
+        return np.zeros((len(x), count))
     span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
     functions = np.zeros((len(x), len(knots) - 1))
     functions[np.arange(len(x)), span] = 1.0
@@ -108,7 +111,7 @@ class NurbsCurve:
     knots: Floats
 
     def __post_init__(self) -> None:
-        _freeze(self, control_points=self.control_points, weights=self.weights, knots=self.knots)
+        freeze_arrays(self)
 
     @property
     def degree(self) -> int:
@@ -143,13 +146,7 @@ class NurbsSurface:
     knots_v: Floats
 
     def __post_init__(self) -> None:
-        _freeze(
-            self,
-            control_points=self.control_points,
-            weights=self.weights,
-            knots_u=self.knots_u,
-            knots_v=self.knots_v,
-        )
+        freeze_arrays(self)
         if self.control_points.ndim != 3 or self.weights.shape != self.control_points.shape[:2]:
             raise ParameterError(
                 "weights", self.weights.shape, f"one weight per control point: {self.control_points.shape[:2]}"
@@ -287,10 +284,3 @@ def _quotient(numerator: Floats, order: int) -> Floats:
         mixed = weight[1, 0] * result[0, 1] + weight[0, 1] * result[1, 0] + weight[1, 1] * result[0, 0]
         result[1, 1] = (numerator[1, 1, :, :3] - mixed) / weight[0, 0]
     return result
-
-
-def _freeze(instance: object, **arrays: ArrayLike) -> None:
-    for name, value in arrays.items():
-        stored = np.array(value, dtype=float, order="C")
-        stored.setflags(write=False)
-        object.__setattr__(instance, name, stored)

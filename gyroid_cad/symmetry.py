@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import freeze_arrays
+
 __all__ = [
     "CELL_QUARTERS",
     "PATCH_CORNERS",
@@ -56,10 +58,7 @@ class Placements:
     bounding_cell: Integers
 
     def __post_init__(self) -> None:
-        for name in ("matrices", "translations", "bounding_cell"):
-            stored = np.array(getattr(self, name), dtype=np.int64)
-            stored.setflags(write=False)
-            object.__setattr__(self, name, stored)
+        freeze_arrays(self)
 
     def __len__(self) -> int:
         return len(self.matrices)

@@ -27,7 +27,7 @@ AREA_PER_CELL = 1.5 * (K / K_PRIME + K_PRIME / K)
 EULER_CHARACTERISTIC = -8
 # Twice the smallest radius of curvature, scale a / 2 at the patch's centre, with a = L / 2.
 THICKNESS_LIMIT = GYROID.scale / 2
-# How much of that radius a fitted patch is trusted with: its deviation takes a few millionths.
+# At the limit itself the wall is a cusp. A fit folds over a little earlier, which the wall checks.
 _SOUNDNESS_MARGIN = 1e-5
 LARGEST_THICKNESS = THICKNESS_LIMIT * (1 - _SOUNDNESS_MARGIN)
 _CUBIC = -2 * pi * EULER_CHARACTERISTIC / 12

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.complex import CellComplex
-from gyroid_cad.fit import FittedPatch, require_shared_edges
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fit import FittedPatch, largest_offset, require_shared_edges
 from gyroid_cad.nurbs import NurbsSurface, basis, edge_row, gauss_points
 from gyroid_cad.symmetry import QUARTER
 
@@ -51,6 +53,9 @@ class Wall:
     patch_shift: Integers
     weights: Floats
     knots: Floats
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def face(self, net: int, side: int) -> NurbsSurface:
         """One face of a distinct patch, before its translation."""
@@ -113,9 +118,18 @@ def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thick
     ------
     FitError
         If the fit's edges do not meet those of its neighbours.
+    ParameterError
+        If the wall is so thick that the fit folds over.
     """
     require_shared_edges(patch)
     bounding_cell_length = cell_size / 2
+    limit = 2 * largest_offset(patch) * bounding_cell_length
+    if not thickness < limit:
+        raise ParameterError(
+            "thickness",
+            thickness,
+            f"below {limit:.6g} mm, where the fit with {patch.settings.control_points} control points folds over",
+        )
     placements = complex.placements
     half = thickness / 2 / bounding_cell_length
     nets = []

@@ -49,6 +49,8 @@ with localcontext() as _context:
     _CORNER_REMAINDER = float(_corner - Decimal(CORNER))
 
 _DOMAIN_SLACK = 1e-9
+# elliprf has no value on its cut, which values a rounding error beyond the corner would meet.
+_BESIDE_CUT = 1e-300j
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +161,9 @@ def corner_chart_points(tau: ArrayLike, family: Family = GYROID) -> Floats:
     ndarray, shape (*tau.shape, 3)
     """
     t = np.asarray(tau, dtype=complex)
-    positions = _sector_points(corner_chart_omega(t), CORNER * t * t, family)
+    # Beside the cut of the square root, on the side that tau comes from.
+    below = CORNER * t * t + _BESIDE_CUT * np.where(t.imag < 0, -1, 1)
+    positions = _sector_points(corner_chart_omega(t), below, family)
     # The corner is a centre of inversion of the surface, tau -> -tau; the integrals see only tau^2.
     beyond = t.real < 0
     if np.any(beyond):
@@ -234,7 +238,7 @@ def _require_domain(omega: Complexes) -> None:
 
 
 def _below_corner(omega: Complexes) -> Complexes:
-    return np.asarray((CORNER - omega) + _CORNER_REMAINDER)
+    return np.asarray((CORNER - omega) + _CORNER_REMAINDER + _BESIDE_CUT)
 
 
 def _sector_points(omega: Complexes, below: Complexes, family: Family) -> Floats:

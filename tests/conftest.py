@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
+import hypothesis
 import pytest
 
 from gyroid_cad.fit import FitSettings
@@ -13,6 +14,10 @@ from gyroid_cad.lattice import Lattice
 
 CELL_SIZE = 10.0
 THICKNESS = 0.8
+
+# A slow machine is no reason to fail.
+hypothesis.settings.register_profile("patient", deadline=None)
+hypothesis.settings.load_profile("patient")
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
 

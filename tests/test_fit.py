@@ -85,10 +85,20 @@ def test_the_reported_distance_is_that_of_the_nearest_points(fitted: FittedPatch
     nearest = []
     for sample in np.argsort(along_normal)[-8:]:
         start = np.clip([u[sample], v[sample]], -0.999, 0.999)
-        tight = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14}
-        result = least_squares(apart, start, bounds=(-1, 1), args=(exact[sample],), **tight)
+        result = least_squares(apart, start, bounds=(-1, 1), args=(exact[sample],), xtol=1e-14, ftol=1e-14, gtol=1e-14)
         nearest.append(np.linalg.norm(result.fun) / CELL_SIZE)
     assert max(nearest) == pytest.approx(fit_report(fitted).max_distance, rel=0.02)
+
+
+def test_the_reported_angle_is_in_degrees_and_the_curvature_per_cell_size(fitted: FittedPatch) -> None:
+    u, v = np.linspace(-1, 1, 121)[:, np.newaxis], np.linspace(-1, 1, 121)
+    sine = np.linalg.norm(np.cross(fitted.surface.normals(u, v), smooth(u, v)[1]), axis=-1)
+    report = fitted.report()
+    assert report == fit_report(fitted)
+    # The normals compared here are not quite at the nearest points.
+    assert np.degrees(np.arcsin(sine.max())) == pytest.approx(report.max_normal_angle, rel=0.25)
+    per_cell_size = fitted.surface.transformed(np.eye(3) / CELL_SIZE).mean_curvature(u, v)
+    assert np.abs(per_cell_size).max() == pytest.approx(report.max_mean_curvature, rel=0.05)
 
 
 @pytest.mark.parametrize(

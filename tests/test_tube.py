@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from gyroid_cad.tube import (
     AREA_PER_CELL,
-    DENSITY_LIMIT,
     EULER_CHARACTERISTIC,
+    LARGEST_DENSITY,
+    LARGEST_THICKNESS,
     THICKNESS_LIMIT,
     density_of_thickness,
     face_area,
@@ -44,7 +45,7 @@ def test_density_and_thickness_are_inverse(thickness: float) -> None:
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.floats(0, DENSITY_LIMIT))
+@given(st.floats(0, LARGEST_DENSITY))
 def test_thickness_and_density_are_inverse(density: float) -> None:
     assert density_of_thickness(thickness_of_density(density)) == pytest.approx(density, rel=1e-9, abs=1e-15)
 
@@ -105,4 +106,4 @@ def test_the_surface_is_nowhere_more_curved_than_at_patch_centres(radius: float,
 
 def test_faces_shrink_to_points_nowhere_before_the_limit() -> None:
     assert 0 < face_area(THICKNESS_LIMIT) < AREA_PER_CELL
-    assert density_of_thickness(THICKNESS_LIMIT) == DENSITY_LIMIT < 1
+    assert density_of_thickness(LARGEST_THICKNESS) == LARGEST_DENSITY < 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,10 +12,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.complex import build_complex
-from gyroid_cad.errors import FitError
-from gyroid_cad.fit import FitSettings, fit_patch
+from gyroid_cad.errors import FitError, ParameterError
+from gyroid_cad.fit import FitSettings, fit_patch, largest_offset
 from gyroid_cad.nurbs import NurbsSurface, basis, gauss_points
-from gyroid_cad.symmetry import CELL_QUARTERS, cubic_cell
+from gyroid_cad.symmetry import CELL_QUARTERS, Placements, bounding_cell, cubic_cell
 from gyroid_cad.tube import density_of_thickness, face_area
 from gyroid_cad.wall import SIDES, Wall, build_wall
 
@@ -31,8 +32,8 @@ def wall_of(cells: tuple[int, int, int] = (1, 1, 1), relative_thickness: float =
 
 
 def flux(surface: NurbsSurface) -> Floats:
-    """Integrals over a surface of du x dv (three) and of the position by it (one): exact, or nearly if rational."""
-    per_span = 16 if surface.rational else 6
+    """Integrals over a surface of du x dv (three) and of the position by it (one), to rounding even if rational."""
+    per_span = 20 if surface.rational else 6
     u, weights_u = gauss_points(surface.knots_u, per_span)
     v, weights_v = gauss_points(surface.knots_v, per_span)
     d = surface.derivatives(u[:, np.newaxis], v)
@@ -76,7 +77,7 @@ def densely(surface: NurbsSurface, count: int) -> Floats:
 @pytest.mark.parametrize("relative_thickness", [0.01, 0.05, 0.1, 0.2, 0.3, 0.37])
 def test_volume_and_face_areas_of_a_period_are_those_of_the_tube_formula(relative_thickness: float) -> None:
     wall = wall_of((1, 1, 1), relative_thickness)
-    assert wall.volume() == pytest.approx(density_of_thickness(relative_thickness) * CELL_SIZE**3, rel=2e-6)
+    assert wall.volume() == pytest.approx(density_of_thickness(relative_thickness) * CELL_SIZE**3, rel=4e-7)
     nodes, weights = gauss_points(wall.knots, 6)
     for side in SIDES:
         area = 0.0
@@ -156,6 +157,24 @@ def test_on_both_faces_du_x_dv_points_along_the_common_normal() -> None:
             assert np.min(np.sum(face.normals(u, v) * through, axis=-1)) > 0.999
 
 
+def test_faces_fold_over_just_past_the_largest_offset_of_the_fit_and_not_before() -> None:
+    patch = fit_patch()
+    u, v = np.linspace(-1, 1, 101)[:, np.newaxis], np.linspace(-1, 1, 101)
+
+    def least_area(offset: float) -> float:
+        faces = [patch.offset(side * offset).derivatives(u, v) for side in (-1, 1)]
+        return min(float(np.min(np.sum(np.cross(d[1, 0], d[0, 1]) * patch.normals.evaluate(u, v), -1))) for d in faces)
+
+    assert least_area(0.999 * largest_offset(patch)) > 0 > least_area(1.001 * largest_offset(patch))
+
+
+def test_a_wall_past_the_fits_own_limit_is_refused_with_the_limit() -> None:
+    limit = 2 * largest_offset(fit_patch()) * CELL_SIZE / 2
+    wall_of((1, 1, 1), 0.9999 * limit / CELL_SIZE)
+    with pytest.raises(ParameterError, match=f"thickness = .*below {limit:.6g} mm"):
+        wall_of((1, 1, 1), limit / CELL_SIZE)
+
+
 @settings(max_examples=5, deadline=None)
 @given(st.floats(0.1, 100))
 def test_volume_goes_with_the_cube_of_the_size(factor: float) -> None:
@@ -185,6 +204,18 @@ def test_the_bounding_box_holds_the_wall_tightly(cells: tuple[int, int, int]) ->
     np.testing.assert_allclose(np.concatenate([low, high]), np.concatenate([lowest, highest]), rtol=0, atol=1e-5 * size)
 
 
+def test_the_bounding_box_is_tight_where_the_extremes_lie_nowhere_special() -> None:
+    # In these directions one patch reaches furthest somewhere along its edges, between samples.
+    cell = cubic_cell()
+    one = Placements(cell.matrices[:1], cell.translations[:1], cell.bounding_cell[:1])
+    upright = build_wall(build_complex((1, 1, 1), one), fit_patch(), CELL_SIZE, THICKNESS)
+    turn = np.array([[0.77, 0.08, -0.63], [-0.13, 0.59, 0.8], [0.16, -0.82, 0.55]])
+    wall = replace(upright, nets=upright.nets @ turn.T)
+    cloud = np.concatenate([densely(wall.face(0, side), 801) for side in SIDES])
+    extremes = np.array([cloud.min(axis=0), cloud.max(axis=0)])
+    np.testing.assert_allclose(wall.bounding_box(), extremes, rtol=0, atol=1e-6 * np.ptp(extremes))
+
+
 def test_patches_of_other_cells_are_translates_by_whole_cells() -> None:
     wall = wall_of((2, 1, 2))
     assert len(wall.nets) == 24
@@ -211,12 +242,12 @@ def test_the_mid_points_of_the_wall_are_the_placed_corners() -> None:
 def test_rational_patches_make_a_closed_wall_too() -> None:
     paper = FitSettings.paper()
     patch = fit_patch(FitSettings(10, paper.knots, paper.weights, "smooth"))
-    wall = build_wall(build_complex((1, 1, 1)), patch, 1.0, 0.1)
+    # A quarter of a period: as exact as a whole one, and quicker.
+    wall = build_wall(build_complex((1, 1, 1), bounding_cell()), patch, 1.0, 0.1)
     area_vector, volume = enclosed(wall)
     np.testing.assert_allclose(area_vector, 0, atol=1e-9)
-    # Gauss points are exact for polynomial nets only.
-    assert wall.volume() == pytest.approx(volume, rel=2e-4)
-    assert volume == pytest.approx(density_of_thickness(0.1), rel=2e-4)
+    assert wall.volume() == pytest.approx(volume, rel=1e-9)
+    assert volume == pytest.approx(density_of_thickness(0.1) / 4, rel=2e-4)
 
 
 def test_a_fit_that_shares_no_edges_makes_no_wall() -> None:

@@ -1,0 +1,243 @@
+"""The lattice: what it accepts, what it says of itself, what it makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import FrozenInstanceError, asdict
+from fractions import Fraction
+from math import inf, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from OCP.Bnd import Bnd_Box
+from OCP.BRepBndLib import BRepBndLib
+from OCP.gp import gp_Trsf, gp_Vec
+from OCP.TopLoc import TopLoc_Location
+
+from gyroid_cad import Lattice
+from gyroid_cad.errors import FitError, GyroidError, ParameterError
+from gyroid_cad.fit import FitSettings
+from gyroid_cad.kernel.check import enclosed_volume, topology
+from gyroid_cad.kernel.step import read_step
+from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, THICKNESS_LIMIT
+
+GOOD: dict[str, Any] = {"cells": (1, 1, 1), "cell_size": 10.0, "thickness": 0.8}
+COARSE = FitSettings(5)
+
+relative_thicknesses = st.floats(1e-3, 0.376)
+densities = st.floats(1e-3, 0.94)
+sizes = st.floats(1.0, 1e3)
+
+NUMBER_WORDS = "a finite number"
+CELL_WORDS = "three whole numbers, each 1 or more"
+WALL_WORDS = "and below 3.7647 mm"
+DENSITY_WORDS = f"above 0 and below {LARGEST_DENSITY:.5f}"
+BAD_CELLS = [0, -1, 1.5, True, "2", None, nan]
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "accepted"),
+    [
+        *(("cell_size", value, NUMBER_WORDS) for value in (nan, inf, -inf, "10", None, True, 1j, [10])),
+        *(("cell_size", value, "0.01 to 100000 mm") for value in (0.0, -10.0, 1e-3, 1e6)),
+        *(("thickness", value, NUMBER_WORDS) for value in (nan, inf, "0.8", True)),
+        *(
+            ("thickness", value, WALL_WORDS)
+            for value in (0.0, -0.8, 1e-5, THICKNESS_LIMIT * 10, LARGEST_THICKNESS * 10, 3.765, 10.0)
+        ),
+        *(("cells", (bad, 1, 1), CELL_WORDS) for bad in BAD_CELLS),
+        *(("cells", (1, 1, bad), CELL_WORDS) for bad in BAD_CELLS),
+        *(("cells", bad, CELL_WORDS) for bad in ((), (1, 1), (1, 1, 1, 1), 2, None, "111")),
+        *(("fit", bad, "a FitSettings") for bad in (10, None, "paper")),
+    ],
+)
+def test_a_bad_value_is_refused_in_one_line_with_its_name_and_what_is_accepted(
+    parameter: str, value: object, accepted: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Lattice(**{**GOOD, parameter: value})
+    message = str(caught.value)
+    assert message.startswith(f"{parameter} = {value!r}: expected ")
+    assert accepted in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("density", "accepted"),
+    [
+        *((value, NUMBER_WORDS) for value in (nan, inf, "0.2", False)),
+        *((value, DENSITY_WORDS) for value in (0.0, -0.2, LARGEST_DENSITY, 0.941, 1.0, 24.5)),
+        (1e-9, "at least 3.09e-05"),
+    ],
+)
+def test_a_bad_density_is_refused_in_one_line_with_the_range(density: object, accepted: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Lattice((1, 1, 1), 10.0, density=density)  # type: ignore[arg-type]
+    assert str(caught.value).startswith(f"density = {density!r}: expected ")
+    assert accepted in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("given_values", [{}, {"thickness": 0.8, "density": 0.2}])
+def test_thickness_and_density_exclude_each_other_and_one_is_needed(given_values: dict[str, float]) -> None:
+    with pytest.raises(ParameterError, match="exactly one of the two"):
+        Lattice((1, 1, 1), 10.0, **given_values)
+
+
+@pytest.mark.parametrize("count", [3, 41, 0, -10, 2.5, 10.0, True, "10", None])
+def test_a_bad_number_of_control_points_is_refused(count: object) -> None:
+    with pytest.raises(ParameterError, match=r"^control_points = ") as caught:
+        FitSettings(count)  # type: ignore[arg-type]
+    assert "4 to 40" in str(caught.value) or "a whole number" in str(caught.value)
+
+
+def test_numbers_of_other_kinds_are_taken_for_what_they_are() -> None:
+    lattice = Lattice(np.array([1, 2, 3]), np.float32(10), Fraction(4, 5))  # type: ignore[arg-type]
+    assert lattice == Lattice((1, 2, 3), 10, 0.8)
+    assert hash(lattice) == hash(Lattice((1, 2, 3), 10, 0.8))
+    assert all(type(count) is int for count in lattice.cells)
+    assert type(lattice.cell_size) is type(lattice.thickness) is float
+
+
+@given(sizes, relative_thicknesses)
+def test_density_and_thickness_say_the_same(size: float, relative: float) -> None:
+    by_thickness = Lattice((1, 1, 1), size, thickness=relative * size)
+    by_density = Lattice((1, 1, 1), size, density=by_thickness.volume_fraction)
+    assert by_density.wall_thickness == pytest.approx(by_thickness.wall_thickness, rel=1e-9)
+    assert by_density.exact_volume == pytest.approx(by_thickness.exact_volume, rel=1e-12)
+
+
+@given(sizes, densities)
+def test_thickness_of_a_density_has_that_density(size: float, density: float) -> None:
+    lattice = Lattice((1, 1, 1), size, density=density)
+    again = Lattice((1, 1, 1), size, thickness=lattice.wall_thickness)
+    assert again.volume_fraction == pytest.approx(density, rel=1e-9)
+
+
+@given(st.tuples(*(st.integers(1, 9),) * 3), sizes, relative_thicknesses, st.floats(0.5, 2))
+def test_the_exact_volume_goes_with_the_cells_and_the_cube_of_the_size(
+    cells: tuple[int, int, int], size: float, relative: float, factor: float
+) -> None:
+    one, block = (Lattice(count, size, relative * size) for count in ((1, 1, 1), cells))
+    larger = Lattice(cells, factor * size, relative * factor * size)
+    assert block.exact_volume == pytest.approx(cells[0] * cells[1] * cells[2] * one.exact_volume, rel=1e-12)
+    assert larger.exact_volume == pytest.approx(factor**3 * block.exact_volume, rel=1e-9)
+
+
+def test_anything_below_the_largest_wall_is_accepted() -> None:
+    thickest = Lattice((1, 1, 1), 10.0, float(np.nextafter(LARGEST_THICKNESS * 10.0, 0)))
+    densest = Lattice((1, 1, 1), 10.0, density=float(np.nextafter(LARGEST_DENSITY, 0)))
+    assert thickest.volume_fraction == pytest.approx(LARGEST_DENSITY)
+    assert densest.wall_thickness == pytest.approx(LARGEST_THICKNESS * 10.0)
+    with pytest.raises(ParameterError):
+        Lattice((1, 1, 1), 10.0, LARGEST_THICKNESS * 10.0)
+
+
+def test_a_lattice_cannot_be_changed() -> None:
+    lattice = Lattice(**GOOD)
+    for name in ("cells", "cell_size", "thickness", "density", "fit"):
+        with pytest.raises(FrozenInstanceError):
+            setattr(lattice, name, None)
+
+
+def test_equal_lattices_are_one_key_and_one_build() -> None:
+    first, second = (Lattice((1, 1, 1), 10, 0.8, fit=FitSettings(5)) for _ in range(2))
+    assert len({first, second}) == 1
+    assert first.wall() is second.wall()
+    assert first.solid().IsPartner(second.solid())
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 1, 1), (1, 2, 3)])
+def test_the_bounding_box_is_the_kernels_tightest(cells: tuple[int, int, int]) -> None:
+    lattice = Lattice(cells, 10.0, 0.8, fit=COARSE)
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(lattice.solid(), box, False, False)
+    np.testing.assert_allclose(np.ravel(lattice.bounding_box()), box.Get(), atol=1e-4)
+
+
+def test_moving_a_solid_moves_no_other_and_not_the_lattice(cell: Lattice) -> None:
+    shift = gp_Trsf()
+    shift.SetTranslation(gp_Vec(1, 2, 3))
+    before = cell.bounding_box()
+    moved = cell.solid()
+    moved.Move(TopLoc_Location(shift))
+    assert cell.solid().Location().IsIdentity()
+    assert not moved.Location().IsIdentity()
+    assert cell.bounding_box() == before
+
+
+def test_the_report_agrees_with_the_solid_and_with_itself(cell: Lattice) -> None:
+    report, complex = cell.report(), cell.wall().complex
+    assert (report.solids, report.faces) == (topology(cell.solid()).solids, topology(cell.solid()).faces)
+    assert report.faces == 2 * report.patches + report.free_edges
+    assert (report.patches, report.pinch_lines) == (complex.patch_count, complex.pinch_lines)
+    assert report.valid
+    assert report.closed
+    assert report.volume == enclosed_volume(cell.solid())
+    assert report.volume_exact == pytest.approx(report.density * cell.cell_size**3)
+    assert report.as_dict() == asdict(report)
+
+
+def test_the_deviation_is_a_length_and_scales_with_the_cell() -> None:
+    small, large = (Lattice((1, 1, 1), size, 0.08 * size, fit=COARSE).report() for size in (1.0, 100.0))
+    assert large.max_deviation == pytest.approx(100 * small.max_deviation, rel=1e-9)
+    assert large.max_normal_angle == pytest.approx(small.max_normal_angle, rel=1e-9)
+
+
+def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> None:
+    names = ["part.step", "part.brep", "part.stl"]
+    cell.write(*(tmp_path / name for name in names), schema="ap242", deviation=0.1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    assert enclosed_volume(read_step(tmp_path / "part.step")) == pytest.approx(cell.wall().volume(), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("names", "settings", "words"),
+    [
+        (["good.step", "bad.obj"], {}, "bad.obj"),
+        (["good.step", "missing/bad.step"], {}, "existing folder"),
+        (["good.step", "good.step"], {}, "each file once"),
+        (["good.step"], {"schema": "ap203"}, "ap214 or ap242"),
+        (["good.stl"], {"deviation": 0}, "a length above 0 mm"),
+        (["good.stl"], {"deviation": "fine"}, NUMBER_WORDS),
+        (["good.stl"], {"deviation": nan}, NUMBER_WORDS),
+        (["good.stl"], {"angle": 90}, "below 90 degrees"),
+        (["good.stl"], {"angle": nan}, "below 90 degrees"),
+        (["good.stl"], {"angle": "steep"}, "below 90 degrees"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_anything_is_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: list[str], settings: dict[str, Any], words: str
+) -> None:
+    monkeypatch.setattr("gyroid_cad.lattice.build", lambda *_: pytest.fail("it was built"))
+    with pytest.raises(ParameterError) as caught:
+        Lattice(**GOOD).write(*(tmp_path / name for name in names), **settings)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_may_not_be_written_to_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    with pytest.raises(ParameterError, match="does not allow it"):
+        Lattice(**GOOD).write(tmp_path / "part.step")
+
+
+def test_too_many_cells_are_refused_in_gigabytes() -> None:
+    enormous = Lattice((100_000, 100_000, 100_000), 10.0, 0.8)
+    with pytest.raises(ParameterError, match=r"cells = \(100000, 100000, 100000\): .* GB"):
+        enormous.solid()
+
+
+def test_the_papers_own_fit_is_refused_with_its_gap_and_no_file(tmp_path: Path) -> None:
+    lattice = Lattice(**GOOD, fit=FitSettings.paper())
+    calls: list[Callable[[], object]] = [lattice.solid, lattice.report, lambda: lattice.write(tmp_path / "part.step")]
+    for call in calls:
+        with pytest.raises(FitError, match=r"\d\.\d\de-0\d of the cell size apart") as caught:
+            call()
+        assert isinstance(caught.value, GyroidError)
+    assert not list(tmp_path.iterdir())

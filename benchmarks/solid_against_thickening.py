@@ -117,7 +117,8 @@ def _step_bytes(shape: TopoDS_Shape) -> tuple[int, int, int]:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "block.step"
         write_step(shape, path)
-        return path.stat().st_size, *(_kernel_step_bytes(shape, path, curves) for curves in (0, 1))
+        ours = path.stat().st_size
+        return ours, _kernel_step_bytes(shape, path, 0), _kernel_step_bytes(shape, path, 1)
 
 
 def _kernel_step_bytes(shape: TopoDS_Shape, path: Path, parameter_curves: int) -> int:

@@ -9,7 +9,7 @@ from OCP.BRepGProp import BRepGProp
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.complex import build_complex
 from gyroid_cad.fit import fit_patch
@@ -41,11 +41,11 @@ def kernel_volume(shape: TopoDS_Shape) -> float:
     return float(properties.Mass())
 
 
-def sewn(faces: Iterable[TopoDS_Face]) -> TopoDS_Shape:
-    """What the kernel's sewing makes of separate faces."""
+def sewn(parts: Iterable[TopoDS_Shape]) -> TopoDS_Shape:
+    """What the kernel's sewing makes of separate faces or shells."""
     sewing = BRepBuilderAPI_Sewing(_SEWING_TOLERANCE)
-    for face in faces:
-        sewing.Add(face)
+    for part in parts:
+        sewing.Add(part)
     sewing.Perform()
     return sewing.SewedShape()
 

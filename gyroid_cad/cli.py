@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 PROGRAM = "gyroid-cad"
+# Columns of a pipe, which has none.
+_UNWRAPPED = 100_000
 DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 Progress = Callable[[str, int, int], None]
@@ -142,7 +144,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done, 1 failed, 2 bad usage; an error is one line on stderr.
     """
     try:
-        status = commands.main(arguments, prog_name=PROGRAM, standalone_mode=False)
+        # Not commands.main: it would put an empty line before the one that says "interrupted".
+        with commands.make_context(PROGRAM, list(sys.argv[1:] if arguments is None else arguments)) as context:
+            commands.invoke(context)
+        status = DONE
+    except click.exceptions.Exit as left:
+        status = left.exit_code
     except click.exceptions.NoArgsIsHelpError as shown:
         click.echo(shown.format_message(), err=True)
         status = BAD_USAGE
@@ -156,7 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _fail("interrupted", INTERRUPTED)
     except Exception as problem:  # a defect of ours is still one line for the user
         status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
-    return status if isinstance(status, int) else DONE
+    return status
 
 
 def _fail(message: str, status: int) -> int:
@@ -221,5 +228,5 @@ def _print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]
     for row in rows:
         table.add_row(*row)
     # In a pipe there is no width to respect: nothing is wrapped.
-    console = Console(highlight=False, markup=False, **({} if sys.stdout.isatty() else {"width": 200}))  # type: ignore[arg-type]
+    console = Console(highlight=False, markup=False, **({} if sys.stdout.isatty() else {"width": _UNWRAPPED}))  # type: ignore[arg-type]
     console.print(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,19 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.Geom import Geom_BSplineSurface
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SOLID
-from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopAbs import (
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_FORWARD,
+    TopAbs_Orientation,
+    TopAbs_REVERSED,
+    TopAbs_ShapeEnum,
+    TopAbs_SOLID,
+)
+from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
@@ -45,13 +54,17 @@ class Topology:
 
 def topology(shape: TopoDS_Shape) -> Topology:
     """Count solids, faces and edges that are not shared by exactly two faces."""
-    faces_of_edge = TopTools_IndexedDataMapOfShapeListOfShape()
-    TopExp.MapShapesAndAncestors_s(shape, TopAbs_EDGE, TopAbs_FACE, faces_of_edge)
-    extents = (faces_of_edge.FindFromIndex(i).Extent() for i in range(1, faces_of_edge.Extent() + 1))
+    edges = TopTools_IndexedMapOfShape()
+    uses: dict[tuple[int, TopAbs_Orientation], int] = {}
+    # The explorer visits an edge once for each face it bounds, oriented as that face uses it.
+    for edge in _parts(shape, TopAbs_EDGE):
+        use = (edges.Add(edge), edge.Orientation())
+        uses[use] = uses.get(use, 0) + 1
+    both = ((uses.get((i, TopAbs_FORWARD)), uses.get((i, TopAbs_REVERSED))) for i in range(1, edges.Extent() + 1))
     return Topology(
-        solids=_count(shape, TopAbs_SOLID),
-        faces=_count(shape, TopAbs_FACE),
-        open_edges=sum(extent != 2 for extent in extents),
+        solids=sum(1 for _ in _parts(shape, TopAbs_SOLID)),
+        faces=sum(1 for _ in _parts(shape, TopAbs_FACE)),
+        open_edges=sum(pair != (1, 1) for pair in both),
     )
 
 
@@ -79,9 +92,8 @@ def enclosed_volume(shape: TopoDS_Shape) -> float:
     """
     fluxes: dict[int, tuple[Geom_BSplineSurface, float, Floats]] = {}
     volume = 0.0
-    explorer = TopExp_Explorer(shape, TopAbs_FACE)
-    while explorer.More():
-        face = TopoDS.Face_s(explorer.Current())
+    for part in _parts(shape, TopAbs_FACE):
+        face = TopoDS.Face_s(part)
         location = TopLoc_Location()
         surface = BRep_Tool.Surface_s(face, location)
         if id(surface) not in fluxes:
@@ -90,10 +102,8 @@ def enclosed_volume(shape: TopoDS_Shape) -> float:
             # The surface is kept alive with its flux, so that its id stays its own.
             fluxes[id(surface)] = (surface, *_flux(surface))
         _, flux, area = fluxes[id(surface)]
-        shift = location.Transformation().TranslationPart()
-        value = flux + area @ (shift.X(), shift.Y(), shift.Z()) / 3
+        value = _placed_flux(flux, area, location)
         volume += -value if face.Orientation() == TopAbs_REVERSED else value
-        explorer.Next()
     return float(volume)
 
 
@@ -106,10 +116,20 @@ def _flux(surface: Geom_BSplineSurface) -> tuple[float, Floats]:
     return float(np.sum(d[0, 0] * area)) / 3, area.sum(axis=(0, 1))
 
 
-def _count(shape: TopoDS_Shape, kind: object) -> int:
-    count = 0
+def _placed_flux(flux: float, area: Floats, location: TopLoc_Location) -> float:
+    """The flux after p -> A p + b: det A times it, and b / 3 through the area vector, which the cofactors of A turn."""
+    if location.IsIdentity():
+        return flux
+    transformation = location.Transformation()
+    rows = np.array([[transformation.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
+    matrix, shift = rows[:, :3], rows[:, 3]
+    determinant = np.linalg.det(matrix)
+    cofactors = determinant * np.linalg.inv(matrix).T
+    return float(determinant * flux + shift @ cofactors @ area / 3)
+
+
+def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
     explorer = TopExp_Explorer(shape, kind)
     while explorer.More():
-        count += 1
+        yield explorer.Current()
         explorer.Next()
-    return count

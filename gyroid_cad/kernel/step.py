@@ -13,6 +13,7 @@ from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
+from OCP.StepBasic import StepBasic_Product
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
@@ -75,6 +76,7 @@ def write_step(
         if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
             raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
         _fill_header(writer, product)
+        _name_product(writer, product)
         raw = temporary.with_name(f"{temporary.name}.raw")
         try:
             if writer.Write(str(raw)) != IFSelect_RetDone:
@@ -116,6 +118,17 @@ def _fill_header(writer: STEPControl_Writer, product: str) -> None:
     if epoch.isdigit():
         # The convention for reproducible builds: the file's date is the one given, in UTC.
         header.SetTimeStamp(text(datetime.fromtimestamp(int(epoch), UTC).strftime("%Y-%m-%dT%H:%M:%S")))
+
+
+def _name_product(writer: STEPControl_Writer, product: str) -> None:
+    """Take the running number off the product's name, which would make every file of a process another."""
+    model = writer.Model()
+    for number in range(1, model.NbEntities() + 1):
+        entity = model.Value(number)
+        if isinstance(entity, StepBasic_Product):
+            entity.SetId(TCollection_HAsciiString(product))
+            entity.SetName(TCollection_HAsciiString(product))
+            return
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 The kernel's writer gives every pole of every curve and surface a CARTESIAN_POINT of its own, in 13 digits. Two
 faces and the edge between them have the same poles there, and ISO 10303-21 lets them share the entity.
-Points of vertices stay their own, so that vertices that coincide stay two.
+Points of anything but splines stay their own, so that vertices that coincide stay two.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ _SIGNIFICANT_DIGITS = 10
 _NOISE_DECIMALS = 12
 
 _POINT = re.compile(r"#(\d+) = CARTESIAN_POINT\('',\(([^()]*)\)\s*\);")
-_VERTEX = re.compile(r"#\d+ = VERTEX_POINT\('[^']*',#(\d+)\);")
 _REFERENCE = re.compile(r"#(\d+)")
 _SPLINE = "B_SPLINE_"
 
@@ -52,21 +51,19 @@ def _entities(lines: TextIO) -> Iterator[str]:
 
 
 def _shared_points(source: Path) -> dict[str, str]:
-    """For each point that repeats an earlier one, the earlier one's id; vertices keep their own."""
+    """For each pole that repeats an earlier point, the earlier one's id."""
     first: dict[str, str] = {}
     shared: dict[str, str] = {}
-    vertices: list[str] = []
+    used_elsewhere: set[str] = set()
     with source.open(encoding="utf-8") as lines:
         for entity in _entities(lines):
             if point := _POINT.match(entity):
                 original = first.setdefault(_rounded(point[2]), point[1])
                 if original != point[1]:
                     shared[point[1]] = original
-            elif vertex := _VERTEX.match(entity):
-                vertices.append(vertex[1])
-    for number in vertices:
-        shared.pop(number, None)
-    return shared
+            elif _SPLINE not in entity:
+                used_elsewhere.update(_REFERENCE.findall(entity))
+    return {number: original for number, original in shared.items() if number not in used_elsewhere}
 
 
 def _rewritten(entity: str, shared: dict[str, str]) -> str:

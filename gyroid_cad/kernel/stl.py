@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from math import isfinite, radians
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +43,9 @@ def require_meshing(deviation: float, angle: float) -> None:
     ------
     ParameterError
     """
-    if not (isfinite(deviation) and deviation > 0):
+    if not (isinstance(deviation, Real) and isfinite(deviation) and deviation > 0):
         raise ParameterError("deviation", deviation, "a length above 0 mm")
-    if not (isfinite(angle) and 0 < angle < 90):
+    if not (isinstance(angle, Real) and isfinite(angle) and 0 < angle < 90):
         raise ParameterError("angle", angle, "above 0 and below 90 degrees")
 
 

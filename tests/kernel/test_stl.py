@@ -13,6 +13,8 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 from OCP.BRepTools import BRepTools
+from OCP.gp import gp_Trsf, gp_Vec
+from OCP.TopLoc import TopLoc_Location
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ExportError, ParameterError
@@ -78,16 +80,13 @@ def test_the_thinnest_and_the_thickest_walls_give_closed_meshes(thickness: float
 
 def test_a_mesh_far_from_the_origin_is_closed_though_stl_counts_in_single_precision(tmp_path: Path) -> None:
     """What parts the touching triangles must be larger than what single precision can tell apart there."""
-    from OCP.gp import gp_Trsf, gp_Vec
-    from OCP.TopLoc import TopLoc_Location
-
-    move = gp_Trsf()
-    move.SetTranslation(gp_Vec(2000, -3000, 1000))
-    solid = Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(5)).solid().Moved(TopLoc_Location(move))
-    write_stl(solid, tmp_path / "far.stl", 0.1)
+    lattice, move = Lattice((2, 1, 1), 10.0, 0.8, fit=FitSettings(5)), gp_Trsf()
+    move.SetTranslation(gp_Vec(20_000, -26_000, 14_000))
+    write_stl(lattice.solid().Moved(TopLoc_Location(move)), tmp_path / "far.stl", 0.02)
     mesh = trimesh.load_mesh(tmp_path / "far.stl")
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
+    assert mesh.euler_number == meshed(lattice, tmp_path, 0.1).euler_number
 
 
 def test_no_point_of_the_wall_is_further_from_a_facet_than_the_deviation(fine_cell: Lattice, tmp_path: Path) -> None:

@@ -114,8 +114,6 @@ class Build:
 
         Raises
         ------
-        ParameterError
-            If the files would not fit into memory while they are made.
         KernelError
             If the kernel finds the solid invalid: then nothing is written.
         ExportError
@@ -124,7 +122,6 @@ class Build:
         from gyroid_cad.kernel.step import write_step
         from gyroid_cad.kernel.stl import write_stl
 
-        _require_memory(self.cells, _FILE_BYTES_PER_CELL)
         if not self.valid(progress):
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
@@ -198,6 +195,8 @@ def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     ------
     ParameterError
     """
+    if not paths:
+        raise ParameterError("output", [], "at least one file name")
     targets = []
     for path in paths:
         if Path(path).suffix.lower() not in FORMATS:
@@ -208,8 +207,8 @@ def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     return targets
 
 
-def require_settings(targets: Sequence[Path], schema: str, deviation: float, angle: float) -> None:
-    """Check the settings of files to be written, before anything is built.
+def require_settings(cells: tuple[int, int, int], schema: str, deviation: float, angle: float) -> None:
+    """Check the settings of files to be written, and that memory will do, before anything is built.
 
     Raises
     ------
@@ -220,6 +219,7 @@ def require_settings(targets: Sequence[Path], schema: str, deviation: float, ang
 
     require_schema(schema)
     require_meshing(deviation, angle)
+    _require_memory(cells, _FILE_BYTES_PER_CELL)
 
 
 def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int) -> None:

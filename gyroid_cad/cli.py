@@ -47,7 +47,7 @@ def commands() -> None:
 @click.option("--cells", nargs=3, type=int, required=True, metavar="NX NY NZ", help="Cubic cells along x, y and z.")
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option("--thickness", type=float, metavar="MM", help="Whole wall, below 0.37647 of the cell size.")
-@click.option("--density", type=float, metavar="RHO", help="Volume fraction instead of thickness, below 0.94034.")
+@click.option("--density", type=float, metavar="RHO", help="Volume fraction instead of thickness, below 0.94033.")
 @click.option(
     "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side."
 )
@@ -61,10 +61,15 @@ def commands() -> None:
 @click.option(
     "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
 )
-@click.option("--deviation", type=float, metavar="MM", help="Of STL facets; a thousandth of the cell size if left out.")
+@click.option(
+    "--deviation",
+    type=float,
+    metavar="MM",
+    help="Of STL facets; a thousandth of the cell size if left out, or a tenth of a thin wall.",
+)
 @click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between STL facets.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
 def build(
     outputs: tuple[str, ...],
     cells: tuple[int, int, int],

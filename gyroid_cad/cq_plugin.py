@@ -11,7 +11,7 @@ from typing import Any
 
 import cadquery as cq
 
-from gyroid_cad.errors import GyroidError
+from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
 
@@ -56,7 +56,9 @@ def gyroid(
     """
     lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings())
     low, high = lattice.bounding_box()
-    per_axis = (centered,) * 3 if isinstance(centered, bool) else centered
+    per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
+    if len(per_axis) != 3:
+        raise ParameterError("centered", centered, "True, False or three of them")
     offset = [-(a + b) / 2 if middle else -a for a, b, middle in zip(low, high, per_axis, strict=True)]
     shape = cq.Shape.cast(lattice.solid()).moved(cq.Location(cq.Vector(*offset)))
     return self.eachpoint(shape.moved, True, combine, clean)

@@ -21,7 +21,10 @@ def require_writable(path: str | os.PathLike[str]) -> Path:
         If its folder is missing or cannot be written to, or the path is a folder.
     """
     target = Path(path)
-    folder = target.resolve().parent
+    try:
+        folder = target.resolve().parent
+    except ValueError:
+        raise ParameterError("output", str(path), "a file name without a null character") from None
     if not folder.is_dir():
         raise ParameterError("output", str(path), f"a file in an existing folder; {folder} is none")
     if target.is_dir():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from math import isfinite, prod
+from math import inf, isfinite, nan, prod
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ Corner = tuple[float, float, float]
 # The kernel takes lengths under 1e-7 mm for nothing; these keep every edge and wall well above.
 SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
 THINNEST_WALL = 1e-4
+MOST_CELLS_ALONG = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +83,7 @@ class Lattice:
     """A block of gyroid cells with a wall of constant thickness.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches
-    are whole, so the wall reaches up to a quarter of a cell beyond it.
+    are whole: the mid-surface reaches a quarter of a cell beyond the block, the wall about half its thickness more.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ class Lattice:
     thickness : float, optional
         Whole wall, in mm, less than 0.37647 L.
     density : float, optional
-        Volume fraction instead of thickness, less than 0.94034.
+        Volume fraction instead of thickness, less than 0.94033.
     fit : FitSettings
         How the patch is fitted.
 
@@ -182,6 +183,8 @@ class Lattice:
             If the kernel's shape is not closed or does not enclose the right volume.
         FitError
             If the fit's edges do not meet those of its neighbours.
+        ParameterError
+            If memory would not do, or the wall is so thick that the fit folds over.
         """
         return self._build(progress).solid()
 
@@ -228,7 +231,8 @@ class Lattice:
         schema : {"ap214", "ap242"}
             Of STEP files.
         deviation : float, optional
-            Of STL facets from the surface, in mm; a thousandth of the cell size if left out.
+            Of STL facets from the surface, in mm; if left out, a thousandth of the cell size, or a tenth of the
+            wall if that is less.
         angle : float
             Between neighbouring STL facets, in degrees.
         progress : callable, optional
@@ -239,8 +243,9 @@ class Lattice:
         ParameterError, FitError, KernelError, ExportError
         """
         targets = require_formats(paths)
-        limit = self.cell_size / 1000 if deviation is None else _number("deviation", deviation, "a length in mm")
-        require_settings(targets, schema, limit, angle)
+        usual = min(self.cell_size / 1000, self.wall_thickness / 10)
+        limit = usual if deviation is None else _number("deviation", deviation, "a length in mm")
+        require_settings(self.cells, schema, limit, angle)
         built = self._build(progress)
         built.write(targets, schema, limit, angle, progress)
 
@@ -269,18 +274,22 @@ class Lattice:
 
 
 def _number(parameter: str, value: object, meaning: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
+    try:
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else nan
+    except OverflowError:
+        number = inf
+    if not isfinite(number):
         raise ParameterError(parameter, value, f"{meaning}, a finite number")
-    return float(value)
+    return number
 
 
 def _validated_cells(cells: Sequence[int]) -> tuple[int, int, int]:
-    accepted = "three whole numbers, each 1 or more"
+    accepted = f"three whole numbers, each from 1 to {MOST_CELLS_ALONG}"
     try:
         counts = tuple(cells)
     except TypeError:
         raise ParameterError("cells", cells, accepted) from None
-    whole = all(isinstance(n, Integral) and not isinstance(n, bool) and n >= 1 for n in counts)
+    whole = all(isinstance(n, Integral) and not isinstance(n, bool) and 1 <= n <= MOST_CELLS_ALONG for n in counts)
     if len(counts) != 3 or not whole:
         raise ParameterError("cells", cells, accepted)
     return int(counts[0]), int(counts[1]), int(counts[2])

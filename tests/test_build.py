@@ -105,13 +105,12 @@ def test_as_many_cells_as_the_refusal_names_would_have_been_accepted(monkeypatch
         build_module._require_memory((most + 1, 1, 1), 1_500_000)
 
 
-def test_writing_needs_memory_too_and_leaves_no_file_without_it(
-    one_build: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=1_000_000))
+def test_the_memory_that_files_take_is_asked_for_before_anything_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
+    enough_to_build = SimpleNamespace(available=405_000_000)
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: enough_to_build)
+    build_module._require_memory(CELLS, 1_500_000)
     with pytest.raises(ParameterError, match="GB"):
-        one_build.write(targets(tmp_path, "a.step"), "ap214", 0.01, 15.0)
-    assert not list(tmp_path.iterdir())
+        require_settings(CELLS, "ap214", 0.01, 15.0)
 
 
 @pytest.mark.usefixtures("forgotten")

@@ -33,7 +33,7 @@ densities = st.floats(1e-3, 0.94)
 sizes = st.floats(1.0, 1e3)
 
 NUMBER_WORDS = "a finite number"
-CELL_WORDS = "three whole numbers, each 1 or more"
+CELL_WORDS = "three whole numbers, each from 1 to 1000000"
 WALL_WORDS = "and below 3.7647 mm"
 DENSITY_WORDS = f"above 0 and below {LARGEST_DENSITY:.5f}"
 BAD_CELLS = [0, -1, 1.5, True, "2", None, nan]
@@ -241,3 +241,22 @@ def test_the_papers_own_fit_is_refused_with_its_gap_and_no_file(tmp_path: Path) 
             call()
         assert isinstance(caught.value, GyroidError)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"cell_size": 10**400}, "cell_size = 1000"),
+        ({"cells": (10**400, 1, 1)}, "from 1 to 1000000"),
+    ],
+)
+def test_numbers_beyond_all_bounds_are_refused_like_any_other(change: dict[str, Any], named: str) -> None:
+    with pytest.raises(ParameterError, match=named):
+        Lattice(**{**GOOD, **change})
+
+
+def test_a_name_with_a_null_character_and_no_name_at_all_are_refused() -> None:
+    with pytest.raises(ParameterError, match="null character"):
+        Lattice(**GOOD).write("a\0.step")
+    with pytest.raises(ParameterError, match="at least one file name"):
+        Lattice(**GOOD).write()

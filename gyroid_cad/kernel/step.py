@@ -35,7 +35,7 @@ def require_schema(schema: str) -> str:
     ------
     ParameterError
     """
-    if schema not in SCHEMAS:
+    if schema not in tuple(SCHEMAS):
         raise ParameterError("schema", schema, " or ".join(SCHEMAS))
     return SCHEMAS[schema]
 
@@ -62,7 +62,9 @@ def write_step(
     ParameterError, ExportError
     """
     kernel_schema = require_schema(schema)
-    product = Path(path).stem if name is None else name
+    wanted = Path(path).stem if name is None else name
+    # The writer puts other characters in unescaped, which ISO 10303-21 does not allow.
+    product = "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
     settings: dict[str, str | int] = {
         "write.step.schema": kernel_schema,
         "write.step.unit": "MM",

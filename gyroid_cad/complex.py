@@ -203,9 +203,17 @@ def _fans(
 
 
 def _connected(count: int, first: Integers, second: Integers) -> Integers:
-    """Label the connected components of a graph on ``count`` nodes; shape (count,)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """Label the connected components of a graph on ``count`` nodes, from 0; shape (count,).
 
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    Every node takes its neighbours' lowest label until none changes. ``scipy.sparse.csgraph`` does the same,
+    but importing it takes longer than all else here.
+    """
+    label = np.arange(count)
+    while np.any(label[first] != label[second]):
+        lowest = np.minimum(label[first], label[second])
+        # A label is a node: hooking labels, not only nodes, joins whole components at once.
+        for ends in (first, second):
+            np.minimum.at(label, label[ends], lowest)
+            np.minimum.at(label, ends, lowest)
+        label = label[label]
+    return np.unique(label, return_inverse=True)[1].astype(np.int64)

@@ -196,11 +196,9 @@ class NurbsSurface:
         """
         u, v = np.asarray(u, float), np.asarray(v, float)
         shape = np.broadcast_shapes(u.shape, v.shape)
-        if u.ndim == v.ndim == 2 and u.shape[1] == v.shape[0] == 1:
-            subscripts = "pjc,qj->pqc"
-        else:
+        open_grid = u.ndim == v.ndim == 2 and u.shape[1] == v.shape[0] == 1
+        if not open_grid:
             u, v = np.broadcast_arrays(u, v)
-            subscripts = "pjc,pj->pc"
         along_u = [basis(self.knots_u, self.degree_u, u.ravel(), k) for k in range(order + 1)]
         along_v = [basis(self.knots_v, self.degree_v, v.ravel(), k) for k in range(order + 1)]
         homogeneous = _homogeneous(self.control_points, self.weights)
@@ -208,7 +206,9 @@ class NurbsSurface:
         numerator = np.zeros((order + 1, order + 1, prod(shape), 4))
         for k in range(order + 1):
             for m in range(order + 1 - k):
-                numerator[k, m] = np.einsum(subscripts, rows[k], along_v[m], optimize=True).reshape(-1, 4)
+                row, functions = rows[k], along_v[m]
+                values = functions @ row if open_grid else np.einsum("pjc,pj->pc", row, functions)
+                numerator[k, m] = values.reshape(-1, 4)
         return _quotient(numerator, order).reshape(order + 1, order + 1, *shape, 3)
 
     def normals(self, u: ArrayLike, v: ArrayLike) -> Floats:

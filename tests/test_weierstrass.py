@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.special import elliprf
 
 from gyroid_cad import weierstrass as ws
 from gyroid_cad.errors import ParameterError
@@ -198,3 +199,10 @@ def test_values_outside_the_domain_are_refused_by_name(omega: complex) -> None:
 def test_everything_beyond_the_bounding_arcs_is_refused(radius: float, phi: float, turn: int) -> None:
     with pytest.raises(ParameterError):
         ws.points(domain_point(radius, phi, turn))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.complex_numbers(max_magnitude=0.9), st.floats(0, 0.99))
+def test_the_elliptic_integral_is_scipys(s: complex, m: float) -> None:
+    arguments = (np.array([1 - s * s]), np.array([1 - m * s * s]), np.ones(1, complex))
+    np.testing.assert_allclose(ws._carlson_rf(*arguments), elliprf(*arguments), rtol=4e-15)

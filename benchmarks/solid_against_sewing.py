@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] = ()) -> bool:
         ("sewing in stages, no side walls", *_figures(staging, staged)),
     ]
     plain_table(
-        f"{options.cells}³ cells to a solid", ("", "best time", "faces", "solids", "edges not of two faces"), lines
+        f"{options.cells}³ cells to a solid", ("", "processor time", "faces", "solids", "edges not of two faces"), lines
     )
     rows = [
         Row("sewing / ours", sewing / ours, 10, 20, "x", at_least=True),

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.timing import Row, best_process_time, print_verdicts, printed_by
+from benchmarks.timing import Row, fresh_python, print_verdicts, seconds_of_process
 
 __all__ = ["main"]
 
@@ -39,12 +39,10 @@ def main(arguments: Sequence[str] = ()) -> bool:
     parser = argparse.ArgumentParser(description="Time the start of fresh processes.")
     parser.add_argument("--repeats", type=int, default=5, help="the best counts (default 5)")
     repeats = parser.parse_args(arguments).repeats
-    importing = min(printed_by(_IMPORT)[0] for _ in range(repeats))
-    fitting = min(printed_by(_FIRST_FIT)[0] for _ in range(repeats))
     with TemporaryDirectory() as folder:
-        building = best_process_time(repeats, *_BUILD, "-o", str(Path(folder) / "cell.step"))
-    cadquery = best_process_time(repeats, "-c", "import cadquery")
-    kernel = best_process_time(repeats, "-c", "import OCP.BRep")
+        output = str(Path(folder) / "cell.step")
+        rounds = [_one_round(output) for _ in range(repeats)]
+    importing, fitting, building, cadquery, kernel = (min(times) for times in zip(*rounds, strict=True))
     return print_verdicts(
         "Start",
         [
@@ -56,6 +54,13 @@ def main(arguments: Sequence[str] = ()) -> bool:
             Row("python -c 'import OCP.BRep'", kernel, unit=" s", remark="whole process: the kernel alone"),
         ],
     )
+
+
+def _one_round(output: str) -> tuple[float, ...]:
+    """Seconds of each: in turn, so that what slows the machine slows all of them."""
+    inside = [float(fresh_python("-c", program)) for program in (_IMPORT, _FIRST_FIT)]
+    processes = [(*_BUILD, "-o", output), ("-c", "import cadquery"), ("-c", "import OCP.BRep")]
+    return *inside, *(seconds_of_process(*arguments) for arguments in processes)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """What every benchmark shares: best-of timing, fresh processes, tables with what is required beside the figures.
 
-Times depend on the machine and on its mood, so they are judged as ratios of two things timed in one run,
-each the best of several.
+Times depend on the machine, so they are judged as ratios of two things timed in one run, each the best of several.
+Inside one process it is processor time that counts, all threads together: other work on the machine then slows
+neither side alone, however long the one runs and however short the other. Whole processes go by the clock.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TypeVar
 
 from rich.console import Console
 from rich.table import Table
 
-__all__ = ["Row", "best_of", "best_process_time", "fresh_python", "plain_table", "print_verdicts", "printed_by"]
+__all__ = ["Row", "best_in_turn", "best_of", "fresh_python", "plain_table", "print_verdicts", "seconds_of_process"]
 
 ROOT = Path(__file__).resolve().parent.parent
 _NARROWEST = 130
@@ -74,13 +75,27 @@ class Row:
 
 
 def best_of(task: Callable[[], Result], repeats: int) -> tuple[float, Result]:
-    """Shortest time in seconds of several runs, and the last run's result."""
-    shortest = float("inf")
-    for _ in range(repeats):
-        start = perf_counter()
-        result = task()
-        shortest = min(shortest, perf_counter() - start)
-    return shortest, result
+    """Least processor time in seconds of several runs, and the last run's result."""
+    return best_in_turn(repeats, task)[0]
+
+
+def best_in_turn(repeats: int, *tasks: Callable[[], Result]) -> list[tuple[float, Result]]:
+    """The same of several tasks, run in turn, so that what slows the machine slows all of them."""
+    rounds = [[_timed(task) for task in tasks] for _ in range(repeats)]
+    return [(min(seconds for seconds, _ in runs), runs[-1][1]) for runs in zip(*rounds, strict=True)]
+
+
+def _timed(task: Callable[[], Result]) -> tuple[float, Result]:
+    start = process_time()
+    result = task()
+    return process_time() - start, result
+
+
+def seconds_of_process(*arguments: str) -> float:
+    """Seconds on the clock of a whole fresh process, start of the interpreter included."""
+    start = perf_counter()
+    fresh_python(*arguments)
+    return perf_counter() - start
 
 
 def fresh_python(*arguments: str) -> str:
@@ -96,16 +111,6 @@ def fresh_python(*arguments: str) -> str:
     if process.returncode:
         raise RuntimeError(f"python {' '.join(arguments)} failed:\n{process.stderr}")
     return process.stdout
-
-
-def printed_by(program: str, *arguments: object) -> list[float]:
-    """The numbers a program prints when it is run in a fresh process."""
-    return [float(word) for word in fresh_python("-c", program, *map(str, arguments)).split()]
-
-
-def best_process_time(repeats: int, *arguments: str) -> float:
-    """Shortest time in seconds of a whole fresh process, start of the interpreter included."""
-    return best_of(lambda: fresh_python(*arguments), repeats)[0]
 
 
 def print_verdicts(title: str, rows: Iterable[Row]) -> bool:

@@ -22,6 +22,7 @@ ROWS = [
     ["weierstrass"],
     ["patch"],
     ["nurbs"],
+    ["fit_settings"],
     ["fit"],
     ["symmetry"],
     ["tube"],

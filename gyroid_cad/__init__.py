@@ -11,13 +11,31 @@ from typing import TYPE_CHECKING
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
-    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError
+    from gyroid_cad.block_maps import Bend, Cylinder, Sphere, Twist
+    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SoundnessError
+    from gyroid_cad.fields import (
+        Field,
+        between_planes,
+        constant,
+        distance_from_axis,
+        distance_from_point,
+        expression,
+        linear,
+        radial,
+        sampled,
+        smooth_maximum,
+        smooth_minimum,
+    )
     from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
     from gyroid_cad.lattice import Lattice, LatticeReport
+    from gyroid_cad.maps import SpaceMap
     from gyroid_cad.nurbs import NurbsSurface
 
 __all__ = [
+    "Bend",
+    "Cylinder",
     "ExportError",
+    "Field",
     "FitError",
     "FitReport",
     "FitSettings",
@@ -27,15 +45,44 @@ __all__ = [
     "LatticeReport",
     "NurbsSurface",
     "ParameterError",
+    "SoundnessError",
+    "SpaceMap",
+    "Sphere",
+    "Twist",
     "__version__",
+    "between_planes",
+    "constant",
+    "distance_from_axis",
+    "distance_from_point",
+    "expression",
     "fit_patch",
     "fit_report",
+    "linear",
+    "radial",
+    "sampled",
+    "smooth_maximum",
+    "smooth_minimum",
 ]
 
 _HOMES = {
-    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError"),
+    "block_maps": ("Bend", "Cylinder", "Sphere", "Twist"),
+    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"),
+    "fields": (
+        "Field",
+        "between_planes",
+        "constant",
+        "distance_from_axis",
+        "distance_from_point",
+        "expression",
+        "linear",
+        "radial",
+        "sampled",
+        "smooth_maximum",
+        "smooth_minimum",
+    ),
     "fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
+    "maps": ("SpaceMap",),
     "nurbs": ("NurbsSurface",),
 }
 

@@ -12,7 +12,7 @@ from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, Ro
 from build123d.geometry import to_align_offset
 
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.lattice import Lattice
+from gyroid_cad.lattice import FieldLike, Lattice, MapLike
 
 __all__ = ["Gyroid"]
 
@@ -24,7 +24,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
@@ -43,14 +43,18 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         self,
         cells: tuple[int, int, int],
         cell_size: float,
-        thickness: float | None = None,
-        density: float | None = None,
+        thickness: FieldLike | None = None,
+        density: FieldLike | None = None,
         fit: FitSettings | None = None,
         rotation: RotationLike = (0, 0, 0),
         align: Align | tuple[Align, Align, Align] | None = (Align.CENTER, Align.CENTER, Align.CENTER),
         mode: Mode = Mode.ADD,
+        *,
+        scale_field: FieldLike | None = None,
+        map: MapLike | None = None,
+        tolerance: float | None = None,
     ) -> None:
-        self.lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings())
+        self.lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance)
         part = Part.cast(self.lattice.solid())
         if align is not None:
             # The host would measure the box on the kernel's faces; the control nets give it at once.

@@ -7,6 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property
 from math import prod
 from pathlib import Path
@@ -16,12 +17,15 @@ from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.files import require_writable
 from gyroid_cad.fit import FitSettings, fit_patch
-from gyroid_cad.wall import build_wall
+from gyroid_cad.grading import Grading
+from gyroid_cad.refit import Refit, fitted_wall, likely_control_points, measured
+from gyroid_cad.soundness import CLEARANCE_SAMPLES, FOLD_SAMPLES, require_sound, require_sound_fit
+from gyroid_cad.wall import Wall, build_wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["FORMATS", "Build", "Progress", "build", "require_formats", "require_settings"]
+__all__ = ["FORMATS", "Build", "Progress", "Recipe", "build", "require_formats", "require_settings"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -36,12 +40,35 @@ _VOLUME_AGREEMENT = 1e-9
 _REMEMBERED_BUILDS = 2
 
 
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What to build.
+
+    Attributes
+    ----------
+    cells : tuple of int
+    grading : Grading
+    settings : FitSettings
+    tolerance : float
+        Largest deviation of a wall that varies, in cell sizes; one that does not is fitted as the settings say.
+    """
+
+    cells: tuple[int, int, int]
+    grading: Grading
+    settings: FitSettings
+    tolerance: float
+
+
 class Build:
     """A lattice's wall and its solid, checked closed and full, with the seconds each stage took.
 
     Attributes
     ----------
+    recipe : Recipe
+    complex : CellComplex
     wall : Wall
+    refit : Refit, optional
+        What the fit is worth, of a wall that varies.
     topology : Topology
     volume : float
         In mm3, from the control points the kernel holds.
@@ -49,24 +76,16 @@ class Build:
         By stage.
     """
 
-    def __init__(
-        self,
-        cells: tuple[int, int, int],
-        cell_size: float,
-        thickness: float,
-        settings: FitSettings,
-        progress: Progress | None,
-    ) -> None:
-        _require_memory(cells, _SOLID_BYTES_PER_CELL)
-        self.cells = cells
+    def __init__(self, recipe: Recipe, progress: Progress | None) -> None:
+        self.recipe = recipe
+        self.cells = recipe.cells
+        _require_memory(self.cells, _SOLID_BYTES_PER_CELL, recipe.settings.control_points)
         self.seconds: dict[str, float] = {}
         self._valid: bool | None = None
-        with self.timed("fit", progress):
-            patch = fit_patch(settings)
+        self.refit: Refit | None = None
         with self.timed("complex", progress):
-            complex = build_complex(cells)
-        with self.timed("wall", progress):
-            self.wall = build_wall(complex, patch, cell_size, thickness)
+            self.complex = build_complex(self.cells, closed=recipe.grading.closed)
+        self.wall = self._uniform_wall(progress) if recipe.grading.uniform else self._graded_wall(progress)
         with self.timed("kernel", progress):
             from gyroid_cad.kernel.check import enclosed_volume, topology
             from gyroid_cad.kernel.solid import realise
@@ -76,6 +95,32 @@ class Build:
             self.topology = topology(self._shape)
             self.volume = enclosed_volume(self._shape)
             self._require_closed_and_full()
+
+    def _uniform_wall(self, progress: Progress | None) -> Wall:
+        with self.timed("fit", progress):
+            patch = fit_patch(self.recipe.settings)
+        grading = self.recipe.grading
+        with self.timed("wall", progress):
+            return build_wall(self.complex, patch, grading.cell_size, float(grading.thickness))  # type: ignore[arg-type]
+
+    def _graded_wall(self, progress: Progress | None) -> Wall:
+        """Check that the wall can exist, and fit it until it is as close as asked for."""
+        grading, tolerance, n = self.recipe.grading, self.recipe.tolerance, 0
+        with self.timed("soundness", progress):
+            require_sound(self.complex, grading)
+        with self.timed("deviation", progress):
+            wanted = likely_control_points(self.complex, grading, self.recipe.settings.control_points, tolerance)
+        while n != wanted:
+            n = wanted
+            _require_memory(self.cells, _SOLID_BYTES_PER_CELL, n)
+            with self.timed("fit", progress):
+                wall = fitted_wall(self.complex, grading, n)
+            with self.timed("deviation", progress):
+                self.refit = measured(wall.nets, self.complex, grading)
+            wanted = self.refit.control_points_for(tolerance, grading.cell_size)
+        with self.timed("soundness", progress):
+            require_sound_fit(wall, grading)
+        return wall
 
     @contextmanager
     def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
@@ -91,6 +136,18 @@ class Build:
         """Lowest and highest corner of the box round the wall, in mm."""
         low, high = self.wall.bounding_box()
         return low.tolist(), high.tolist()
+
+    @property
+    def thinnest(self) -> float:
+        """The thinnest wall, in mm."""
+        return float(self.recipe.grading.thickness) if self.refit is None else self.refit.thinnest  # type: ignore[arg-type]
+
+    @property
+    def samples_per_patch(self) -> dict[str, int]:
+        """At how many places of every patch a wall that varies was checked, by what for."""
+        if self.refit is None:
+            return {}
+        return {"deviation": self.refit.samples**2, "fold": FOLD_SAMPLES**2, "clearance": CLEARANCE_SAMPLES**2}
 
     def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""
@@ -148,24 +205,15 @@ class Build:
             )
 
 
-_builds: OrderedDict[tuple[object, ...], Build] = OrderedDict()
+_builds: OrderedDict[Recipe, Build] = OrderedDict()
 
 
-def build(
-    cells: tuple[int, int, int],
-    cell_size: float,
-    thickness: float,
-    settings: FitSettings,
-    progress: Progress | None = None,
-) -> Build:
+def build(recipe: Recipe, progress: Progress | None = None) -> Build:
     """The build of a lattice; the last few are remembered.
 
     Parameters
     ----------
-    cells : tuple of int
-    cell_size, thickness : float
-        In mm.
-    settings : FitSettings
+    recipe : Recipe
     progress : callable, optional
         Called with (stage, done, total).
 
@@ -178,14 +226,13 @@ def build(
     KernelError
         If the kernel's shape is not closed or does not enclose the right volume.
     """
-    key = (cells, cell_size, thickness, settings)
-    if key not in _builds:
-        made = Build(cells, cell_size, thickness, settings, progress)
+    if recipe not in _builds:
+        made = Build(recipe, progress)
         while len(_builds) >= _REMEMBERED_BUILDS:
             _builds.popitem(last=False)
-        _builds[key] = made
-    _builds.move_to_end(key)
-    return _builds[key]
+        _builds[recipe] = made
+    _builds.move_to_end(recipe)
+    return _builds[recipe]
 
 
 def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
@@ -207,7 +254,7 @@ def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     return targets
 
 
-def require_settings(cells: tuple[int, int, int], schema: str, deviation: float, angle: float) -> None:
+def require_settings(cells: tuple[int, int, int], schema: str, deviation: float | None, angle: float) -> None:
     """Check the settings of files to be written, and that memory will do, before anything is built.
 
     Raises
@@ -218,12 +265,14 @@ def require_settings(cells: tuple[int, int, int], schema: str, deviation: float,
     from gyroid_cad.kernel.stl import require_meshing
 
     require_schema(schema)
-    require_meshing(deviation, angle)
+    require_meshing(1.0 if deviation is None else deviation, angle)
     _require_memory(cells, _FILE_BYTES_PER_CELL)
 
 
-def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int) -> None:
+def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int, control_points: int = 10) -> None:
     import psutil
+
+    bytes_per_cell = int(bytes_per_cell * max(1.0, (control_points / 10) ** 2))
 
     needed = _BASE_BYTES + prod(cells) * bytes_per_cell
     available = psutil.virtual_memory().available

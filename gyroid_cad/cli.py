@@ -16,7 +16,7 @@ from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
-    from gyroid_cad.lattice import LatticeReport
+    from gyroid_cad.lattice import Lattice, LatticeReport
 
 __all__ = ["main"]
 
@@ -24,6 +24,9 @@ PROGRAM = "gyroid-cad"
 # Columns of a pipe, which has none.
 _UNWRAPPED = 100_000
 DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+_OWN_OPTIONS = ("thickness", "density", "scale_field")
+_PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 
 Progress = Callable[[str, int, int], None]
 
@@ -34,22 +37,58 @@ def commands() -> None:
     """The gyroid as exact-grade CAD solids. Lengths are in millimetres, angles in degrees."""
 
 
+def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
+    """What a file says takes the place of defaults, so that options on the command line override it."""
+    if path is not None:
+        from gyroid_cad.config import read_config
+
+        values = read_config(path, _LATTICE_KEYS)
+        if isinstance(values.get("output"), str):
+            values["output"] = [values["output"]]
+        context.default_map = values
+    return path
+
+
 @commands.command()
+@click.argument("config", required=False, metavar="[LATTICE.toml]", is_eager=True, callback=_defaults_from_file)
+@click.option("-o", "--output", multiple=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated.")
+@click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z.")
+@click.option("--cell-size", type=float, metavar="MM", help="Period of the cubic cell, before it is scaled or mapped.")
 @click.option(
-    "-o",
-    "--output",
-    "outputs",
-    multiple=True,
-    required=True,
-    metavar="FILE",
-    help=".step, .stp, .brep or .stl; may be repeated.",
+    "--thickness",
+    metavar="MM",
+    help='Whole wall: a number, below 0.37647 of the cell size, or an expression such as "0.8 + 0.02*x".',
 )
-@click.option("--cells", nargs=3, type=int, required=True, metavar="NX NY NZ", help="Cubic cells along x, y and z.")
-@click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
-@click.option("--thickness", type=float, metavar="MM", help="Whole wall, below 0.37647 of the cell size.")
-@click.option("--density", type=float, metavar="RHO", help="Volume fraction instead of thickness, below 0.94033.")
 @click.option(
-    "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side."
+    "--density", metavar="RHO", help="Volume fraction instead of thickness, below 0.94033; may be an expression too."
+)
+@click.option(
+    "--scale-field",
+    metavar="EXPRESSION",
+    help='Cells grow by it, such as "1 + 0.01*x": p is moved to scale-field(p) times p. It is not written into '
+    "--cell-size, for that stays the length by which x, y, z and the tolerance are measured.",
+)
+@click.option(
+    "--map",
+    metavar="MAP",
+    help="Of space: cylinder:radius=MM, sphere:radius=MM (both also angle=DEGREES), twist:angle=, bend:angle=.",
+)
+@click.option("--thickness-factor", metavar="T", help="The paper's: whole wall in BC units, instead of --thickness.")
+@click.option("--bc-length", metavar="B", help="The paper's: length of a bounding cell, instead of --cell-size.")
+@click.option("--scale", type=float, metavar="MM", help="Millimetres per unit of BC length; 1 if left out.")
+@click.option(
+    "--tolerance",
+    type=float,
+    metavar="PART",
+    help="Largest deviation in cell sizes; 1e-4 if left out where the lattice varies.",
+)
+@click.option(
+    "--control-points",
+    type=int,
+    default=10,
+    show_default=True,
+    metavar="N",
+    help="Of a patch, along a side; more are taken where the tolerance asks for them.",
 )
 @click.option(
     "--fit",
@@ -68,42 +107,69 @@ def commands() -> None:
     help="Of STL facets; a thousandth of the cell size if left out, or a tenth of a thin wall.",
 )
 @click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between STL facets.")
+@click.option("--print-config", is_flag=True, help="Print the lattice as TOML, ready for LATTICE.toml; build nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 @click.option("--quiet", is_flag=True, help="Print no table and no progress.")
-def build(
-    outputs: tuple[str, ...],
-    cells: tuple[int, int, int],
-    cell_size: float,
-    thickness: float | None,
-    density: float | None,
-    control_points: int,
-    fit: str,
-    schema: str,
-    deviation: float | None,
-    angle: float,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     """Build a lattice as a closed solid and write it.
+
+    Expressions are of x, y and z in mm, of places in the lattice before anything is moved; pi and functions
+    such as sqrt, sin, exp and minimum are known. A TOML file has these options as keys, with underscores;
+    options given as well override it.
 
     \b
     gyroid-cad build -o part.step -o part.stl --cells 2 2 2 --cell-size 10 --thickness 0.8
+    gyroid-cad build -o part.step --cells 3 3 1 --cell-size 10 --thickness "0.6 + 0.04*x"
+    gyroid-cad build -o ring.step --cells 12 2 1 --cell-size 10 --density 0.2 --map cylinder:radius=20,angle=360
+    gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
     """
     start = time.perf_counter()
-    if (thickness is None) == (density is None):
-        raise click.UsageError("give exactly one of --thickness and --density")
+    if not (given["output"] or print_config):
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    lattice = _lattice(given)
+    if print_config:
+        from gyroid_cad.config import printed_config
 
-    from gyroid_cad.lattice import Lattice
-
-    lattice = Lattice(cells, cell_size, thickness, density, _fit_settings(fit, control_points))
+        click.echo(printed_config(given), nl=False)
+        return
+    outputs = given["output"]
+    settings = {name: given[name] for name in ("schema", "deviation", "angle")}
     with _progress(shown=sys.stderr.isatty() and not quiet) as progress:
-        lattice.write(*outputs, schema=schema, deviation=deviation, angle=angle, progress=progress)
+        lattice.write(*outputs, **settings, progress=progress)
         report = lattice.report(progress)
     summary = _summary(report, outputs, time.perf_counter() - start)
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
         _print_summary(summary)
+
+
+_LATTICE_KEYS = frozenset(p.name for p in build.params if p.name) - {"config", "print_config", "as_json", "quiet"}
+
+
+def _lattice(given: dict[str, Any]) -> Lattice:
+    """The lattice that the options describe, in millimetres or in the paper's units."""
+    from gyroid_cad.lattice import Lattice
+
+    if given["cells"] is None:
+        raise click.UsageError("Missing option '--cells'.")
+    fit = _fit_settings(given["fit"], given["control_points"])
+    if any(given[name] is not None for name in _PAPER_OPTIONS):
+        mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map") if given[name] is not None]
+        if mixed or given["thickness_factor"] is None:
+            options = ", ".join(map(_option, _PAPER_OPTIONS))
+            raise click.UsageError(
+                f"{options} are the paper's units: they need --thickness-factor, and not "
+                + ", ".join(map(_option, mixed or (*_OWN_OPTIONS, "cell_size", "map")))
+            )
+        units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
+        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"])
+    if given["cell_size"] is None:
+        raise click.UsageError("Missing option '--cell-size'.")
+    if (given["thickness"] is None) == (given["density"] is None):
+        raise click.UsageError("give exactly one of --thickness and --density")
+    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance")}
+    return Lattice(given["cells"], given["cell_size"], **own, fit=fit)
 
 
 @commands.command("fit-report")
@@ -177,8 +243,13 @@ def _fail(message: str, status: int) -> int:
 
 
 def _with_option_name(problem: ParameterError) -> str:
-    option = "-o" if problem.parameter == "output" else "--" + problem.parameter.replace("_", "-")
-    return str(problem).replace(problem.parameter, option, 1)
+    if not problem.parameter.isidentifier() or problem.parameter == "config":
+        return str(problem)
+    return str(problem).replace(problem.parameter, _option(problem.parameter), 1)
+
+
+def _option(parameter: str) -> str:
+    return "-o" if parameter == "output" else "--" + parameter.replace("_", "-")
 
 
 def _fit_settings(fit: str, control_points: int) -> Any:
@@ -214,15 +285,29 @@ def _print_summary(summary: dict[str, Any]) -> None:
     error = summary["volume"] / summary["volume_exact"] - 1
     rows = [
         ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
-        ("wall", f"{summary['thickness']:.6g} mm, density {summary['density']:.5f}"),
+        ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
         ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
         ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
         ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
-        ("deviation", f"{summary['max_deviation']:.1e} mm, {summary['max_normal_angle']:.3f} degrees"),
+        ("deviation", _deviation(summary)),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
         ("time", f"{summary['seconds']['total']:.2f} s"),
     ]
     _print_table(None, rows)
+
+
+def _range(summary: dict[str, Any]) -> str:
+    if summary["thinnest"] == summary["thickest"]:
+        return f"{summary['thickness']:.6g}"
+    return f"{summary['thinnest']:.4g} to {summary['thickest']:.4g}, on average {summary['thickness']:.4g}"
+
+
+def _deviation(summary: dict[str, Any]) -> str:
+    n = summary["control_points"]
+    shown = f"{summary['max_deviation']:.1e} mm, {summary['max_normal_angle']:.3f} degrees"
+    if summary["max_wall_error"] is not None:
+        shown += f", wall {summary['max_wall_error']:.1e} of itself"
+    return f"{shown}; {n} x {n} control points a patch"
 
 
 def _print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]) -> None:

@@ -106,7 +106,11 @@ class CellComplex:
         return int(np.sum(np.bincount(self.fan_corner) > 1))
 
 
-def build_complex(cells: tuple[int, int, int], placements: Placements | None = None) -> CellComplex:
+def build_complex(
+    cells: tuple[int, int, int],
+    placements: Placements | None = None,
+    closed: tuple[bool, bool, bool] = (False, False, False),
+) -> CellComplex:
     """Number the patches, edges, corners and fans of a block of cubic cells.
 
     Parameters
@@ -115,6 +119,9 @@ def build_complex(cells: tuple[int, int, int], placements: Placements | None = N
         Number of cells along x, y, z.
     placements : Placements, optional
         The patches of one cell; the paper's arrangement if left out.
+    closed : tuple of bool
+        Along which axes the last cells join the first ones, as round a cylinder: a corner at the far end is the
+        same as that at the near end.
 
     Returns
     -------
@@ -126,6 +133,8 @@ def build_complex(cells: tuple[int, int, int], placements: Placements | None = N
     patch_cell = np.repeat(grid, len(placements), axis=0)
     quarters = placed_corners(placements)[patch_placement] + CELL_QUARTERS * patch_cell[:, np.newaxis]
 
+    for axis in np.flatnonzero(closed):
+        quarters[..., axis] %= CELL_QUARTERS * cells[axis]
     corner_quarters, patch_corners = _numbered_corners(quarters)
     following = np.roll(patch_corners, -1, axis=1)
     ends = np.stack([np.minimum(patch_corners, following), np.maximum(patch_corners, following)], axis=-1)

@@ -13,7 +13,7 @@ import cadquery as cq
 
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.lattice import Lattice
+from gyroid_cad.lattice import FieldLike, Lattice, MapLike
 
 __all__ = ["gyroid"]
 
@@ -24,18 +24,22 @@ def gyroid(
     self: cq.Workplane,
     cells: tuple[int, int, int],
     cell_size: float,
-    thickness: float | None = None,
-    density: float | None = None,
+    thickness: FieldLike | None = None,
+    density: FieldLike | None = None,
     fit: FitSettings | None = None,
     centered: bool | tuple[bool, bool, bool] = True,
     combine: Any = True,
     clean: bool = False,
+    *,
+    scale_field: FieldLike | None = None,
+    map: MapLike | None = None,
+    tolerance: float | None = None,
 ) -> cq.Workplane:
     """A gyroid lattice at each point of the stack.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -54,7 +58,7 @@ def gyroid(
     ------
     ParameterError, FitError, KernelError
     """
-    lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings())
+    lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance)
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
     if len(per_axis) != 3:

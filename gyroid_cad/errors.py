@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError"]
+__all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"]
 
 
 class GyroidError(Exception):
@@ -33,6 +33,63 @@ class ParameterError(GyroidError, ValueError):
 
     def __reduce__(self) -> tuple[type[ParameterError], tuple[str, object, str]]:
         return type(self), (self.parameter, self.value, self.accepted)
+
+
+class SoundnessError(ParameterError):
+    """A field or a map that cannot be built somewhere in the lattice.
+
+    Parameters
+    ----------
+    parameter : str
+        Name of the parameter, as the caller wrote it.
+    value : float
+        At the worst place.
+    place : tuple of float
+        The worst place x, y, z in mm, in the lattice before any map.
+    limit : float
+        The largest value that would pass there; the least for other values of ``accepted``.
+    reason : str
+        What the limit is.
+    accepted : {"below", "above", "at least"}
+    quantity : str
+        What the value is of, if it is not the parameter itself.
+    unit : str
+        Of value and limit.
+    """
+
+    def __init__(
+        self,
+        parameter: str,
+        value: float,
+        place: tuple[float, float, float],
+        limit: float,
+        reason: str,
+        accepted: str = "below",
+        quantity: str = "",
+        unit: str = "",
+    ) -> None:
+        subject = f"{parameter}: {quantity}" if quantity else parameter
+        where = ", ".join(f"{coordinate:.6g}" for coordinate in place)
+        Exception.__init__(
+            self,
+            f"{subject} = {value:.6g}{unit} at (x, y, z) = ({where}) mm: "
+            f"expected {accepted} {limit:.6g}{unit}, {reason}",
+        )
+        self.parameter, self.value, self.accepted, self.quantity = parameter, value, accepted, quantity
+        self.place, self.limit, self.reason, self.unit = place, limit, reason, unit
+
+    def __reduce__(self) -> tuple[type[SoundnessError], tuple[object, ...]]:  # type: ignore[override]
+        given = (
+            self.parameter,
+            self.value,
+            self.place,
+            self.limit,
+            self.reason,
+            self.accepted,
+            self.quantity,
+            self.unit,
+        )
+        return type(self), given
 
 
 class FitError(GyroidError):

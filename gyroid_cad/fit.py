@@ -8,14 +8,14 @@ the edge, so two patches that meet there get the same ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.errors import FitError
-from gyroid_cad.fit_settings import DEGREE, FitSettings
+from gyroid_cad.errors import FitError, ParameterError
+from gyroid_cad.fit_settings import DEGREE, MOST_CONTROL_POINTS, FitSettings, more_control_points
 from gyroid_cad.nurbs import NurbsSurface, basis, edge_row, gauss_points
 from gyroid_cad.patch import (
     EDGE_HALF_TURN,
@@ -32,6 +32,7 @@ __all__ = [
     "edge_gap",
     "fit_patch",
     "fit_report",
+    "fit_within",
     "largest_offset",
     "require_shared_edges",
 ]
@@ -146,6 +147,28 @@ def fit_report(fitted: FittedPatch) -> FitReport:
         edge_gap=edge_gap(fitted),
         corner_error=float(np.max(np.linalg.norm(at_corners - exact(*parameter_corners().T)[0], axis=1)) / _CELL_SIZE),
     )
+
+
+def fit_within(settings: FitSettings, tolerance: float) -> FitSettings:
+    """The same settings, with as many more control points as a tolerance takes.
+
+    Parameters
+    ----------
+    settings : FitSettings
+    tolerance : float
+        Largest deviation of the mid-surface, in cell sizes.
+
+    Raises
+    ------
+    ParameterError
+        If it is out of reach, or the settings' own knots and weights miss it.
+    """
+    while (reached := fit_report(fit_patch(settings)).max_distance) > tolerance:
+        n = settings.control_points
+        if n == MOST_CONTROL_POINTS or not settings.plain:
+            raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
+        settings = replace(settings, control_points=more_control_points(n, reached / tolerance))
+    return settings
 
 
 def edge_gap(fitted: FittedPatch) -> float:

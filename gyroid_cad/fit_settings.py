@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 from typing import Self
 
 import numpy as np
@@ -12,12 +13,14 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.nurbs import uniform_knots
 from gyroid_cad.patch import PARAMETERISATIONS
 
-__all__ = ["DEGREE", "FitSettings"]
+__all__ = ["DEGREE", "FitSettings", "more_control_points"]
 
 Floats = NDArray[np.float64]
 
 DEGREE = 3
 FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS = 4, 40
+# The error of a cubic fit falls with the fourth power of the number of spans; a little more than needed is taken.
+_ORDER, _SURPLUS = 4, 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,11 @@ class FitSettings:
         rows = tuple(tuple(row) for row in weights.tolist())
         return cls(10, (-1.0,) * 4 + inner + (1.0,) * 4, rows, "polar")
 
+    @property
+    def plain(self) -> bool:
+        """Whether the knots are evenly spaced and the weights equal, so that the number can change."""
+        return self.knots is None and self.weights is None and self.parameterisation == "smooth"
+
     def knot_vector(self) -> Floats:
         """The knots, evenly spaced where none were given; shape (control_points + 4,)."""
         return uniform_knots(self.control_points, DEGREE) if self.knots is None else np.array(self.knots)
@@ -76,6 +84,12 @@ class FitSettings:
     def weight_net(self) -> Floats:
         """The weights, 1 where none were given; shape (control_points, control_points)."""
         return np.ones((self.control_points,) * 2) if self.weights is None else np.array(self.weights)
+
+
+def more_control_points(control_points: int, excess: float) -> int:
+    """How many to try next, where the error of a fit is ``excess`` times what it may be."""
+    wanted = DEGREE + (control_points - DEGREE) * (_SURPLUS * excess) ** (1 / _ORDER)
+    return int(min(max(control_points + 1, ceil(wanted)), MOST_CONTROL_POINTS))
 
 
 def _validated_knots(knots: tuple[float, ...], control_points: int) -> tuple[float, ...]:

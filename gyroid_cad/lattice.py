@@ -3,87 +3,60 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 from math import inf, isfinite, nan, prod
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Self
 
-from gyroid_cad.build import Build, Progress, build, require_formats, require_settings
+from numpy.typing import ArrayLike
+
+from gyroid_cad.block_maps import as_map
+from gyroid_cad.build import Build, Progress, Recipe, build, require_formats, require_settings
+from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
+from gyroid_cad.fields import Field, as_field
+from gyroid_cad.fit import FitSettings, fit_patch, fit_report, fit_within
+from gyroid_cad.grading import THINNEST_WALL, Grading
+from gyroid_cad.maps import BlockMap, SpaceMap
+from gyroid_cad.paper import paper_units
+from gyroid_cad.report import LatticeReport
 from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["Lattice", "LatticeReport"]
+__all__ = ["FieldLike", "Lattice", "LatticeReport", "MapLike"]
 
 Corner = tuple[float, float, float]
+FieldLike = float | str | Field | Callable[..., ArrayLike]
+MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
 # The kernel takes lengths under 1e-7 mm for nothing; these keep every edge and wall well above.
 SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
-THINNEST_WALL = 1e-4
 MOST_CELLS_ALONG = 1_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class LatticeReport:
-    """What was built, and how exactly.
-
-    Attributes
-    ----------
-    cells : tuple of int
-    cell_size, thickness : float
-        In mm.
-    density : float
-        Volume fraction of a cell.
-    patches, faces, solids : int
-    valid, closed : bool
-        By the kernel's own check; every edge bounds exactly two faces.
-    free_edges : int
-        Mid-surface edges that bound one patch only: each carries a ruled side wall.
-    pinch_lines : int
-        Lines through the wall in which patches touch without joining.
-    volume, volume_exact : float
-        In mm3: enclosed by the kernel's faces, and by the tube formula.
-    max_deviation : float
-        In mm, of the fitted mid-surface along the exact normal.
-    max_normal_angle : float
-        In degrees, between fitted and exact normal.
-    seconds : dict
-        By stage.
-    """
-
-    cells: tuple[int, int, int]
-    cell_size: float
-    thickness: float
-    density: float
-    patches: int
-    faces: int
-    solids: int
-    valid: bool
-    closed: bool
-    free_edges: int
-    pinch_lines: int
-    volume: float
-    volume_exact: float
-    max_deviation: float
-    max_normal_angle: float
-    seconds: dict[str, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report as plain values, ready for JSON."""
-        return asdict(self)
+# Of a lattice that varies, in cell sizes.
+USUAL_TOLERANCE = 1e-4
+_FIELDS = {
+    "thickness": "a length in mm",
+    "density": "a volume fraction",
+    "scale_field": "a factor without unit",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """A block of gyroid cells with a wall of constant thickness.
+    """A block of gyroid cells: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches
     are whole: the mid-surface reaches a quarter of a cell beyond the block, the wall about half its thickness more.
+
+    Whatever may vary is given as a number, an expression of x, y and z such as "0.8 + 0.02*x", a
+    :class:`~gyroid_cad.fields.Field`, or a function of three arrays. x, y and z are places on the mid-surface, in mm,
+    before anything is moved.
 
     Parameters
     ----------
@@ -91,12 +64,21 @@ class Lattice:
         Number of cubic cells along x, y, z.
     cell_size : float
         Period L of the cubic cell, in mm.
-    thickness : float, optional
-        Whole wall, in mm, less than 0.37647 L.
-    density : float, optional
-        Volume fraction instead of thickness, less than 0.94033.
+    thickness : number or field, optional
+        Whole wall along the normal of the finished mid-surface, in mm; less than 0.37647 L where cells are alike.
+    density : number or field, optional
+        Volume fraction instead of thickness, less than 0.94033. Where it or the space varies the tube
+        formula is inverted place by place, and the wall stretched as the space across it is.
     fit : FitSettings
-        How the patch is fitted.
+        How the patch is fitted. Where the lattice varies, its control points are the fewest to try.
+    scale_field : number or field, optional
+        Cells grow and shrink by it: a place p is moved to scale_field(p) p, the paper's variable BC length.
+    map : SpaceMap, Cylinder, Sphere, Twist, Bend, str or callable, optional
+        Of space, after the scale field; a string as on the command line, such as "cylinder:radius=30", or a
+        function of x, y, z that returns three arrays.
+    tolerance : float, optional
+        Largest deviation of the fit in cell sizes: the number of control points rises until it is met. If left
+        out, 1e-4 where the lattice varies, and ``fit`` as it is where cells are alike.
 
     Raises
     ------
@@ -106,9 +88,12 @@ class Lattice:
 
     cells: tuple[int, int, int]
     cell_size: float
-    thickness: float | None = None
-    density: float | None = None
+    thickness: FieldLike | None = None
+    density: FieldLike | None = None
     fit: FitSettings = field(default_factory=FitSettings)
+    scale_field: FieldLike | None = None
+    map: MapLike | None = None
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", _validated_cells(self.cells))
@@ -118,32 +103,85 @@ class Lattice:
         if (self.thickness is None) == (self.density is None):
             given = {"thickness": self.thickness, "density": self.density}
             raise ParameterError("thickness, density", given, "exactly one of the two")
-        if not isinstance(self.fit, FitSettings):
-            raise ParameterError("fit", self.fit, "a FitSettings")
-        if self.thickness is not None:
-            object.__setattr__(self, "thickness", _number("thickness", self.thickness, "a length in mm"))
+        for name, meaning in _FIELDS.items():
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
+        if self.map is not None:
+            object.__setattr__(self, "map", as_map(self.map))
+        self._require_fit()
+        if self.uniform:
+            self._require_sound_wall()
         else:
-            object.__setattr__(self, "density", _number("density", self.density, "a volume fraction"))
-        self._require_sound_wall()
+            self._grading()
+
+    @classmethod
+    def paper(
+        cls,
+        cells: tuple[int, int, int],
+        thickness_factor: FieldLike,
+        bc_length: FieldLike = 1.0,
+        scale: float = 1.0,
+        fit: FitSettings | None = None,
+        tolerance: float | None = None,
+    ) -> Self:
+        """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
+
+        Parameters
+        ----------
+        cells : tuple of int
+            Number of cubic cells along x, y, z; each is two bounding cells long.
+        thickness_factor : number or field
+            Whole wall in BC units, of places in BC units before they are moved.
+        bc_length : number or field
+            In BC units: a place p is moved to bc_length(p) p.
+        scale : float
+            Millimetres per unit of BC length.
+        fit, tolerance
+            As of :class:`Lattice`.
+
+        Raises
+        ------
+        ParameterError
+        """
+        given = paper_units(thickness_factor, bc_length, scale)
+        return cls(
+            cells,
+            given.cell_size,
+            given.thickness,
+            fit=fit or FitSettings(),
+            scale_field=given.scale_field,
+            tolerance=tolerance,
+        )
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every cell is like every other."""
+        varying = isinstance(self.thickness, Field) or isinstance(self.density, Field)
+        return not varying and self.scale_field is None and self.map is None
 
     @property
     def wall_thickness(self) -> float:
-        """The whole wall in mm, whichever of thickness and density was given."""
-        if self.thickness is not None:
-            return self.thickness
-        assert self.density is not None
-        return thickness_of_density(self.density) * self.cell_size
+        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice varies."""
+        if not self.uniform:
+            return self._measures().mean_thickness
+        if self.density is None:
+            return float(self.thickness)  # type: ignore[arg-type]
+        return thickness_of_density(self.density) * self.cell_size  # type: ignore[arg-type]
 
     @property
     def volume_fraction(self) -> float:
-        """The density, whichever of thickness and density was given: exact, by the tube formula."""
-        if self.density is not None:
-            return self.density
-        return density_of_thickness(self.wall_thickness / self.cell_size)
+        """The density, whichever of thickness and density was given; the whole block's where the lattice varies."""
+        if not self.uniform:
+            return self.exact_volume / block_volume(self.cells, self._grading())
+        if self.density is None:
+            return density_of_thickness(self.wall_thickness / self.cell_size)
+        return float(self.density)  # type: ignore[arg-type]
 
     @property
     def exact_volume(self) -> float:
-        """Volume in mm3 of the exact lattice, by the tube formula."""
+        """Volume in mm3 of the exact lattice, by the tube formula, or by quadrature where it varies."""
+        if not self.uniform:
+            return self._measures().volume
         return prod(self.cells) * self.volume_fraction * self.cell_size**3
 
     def wall(self) -> Wall:
@@ -192,24 +230,31 @@ class Lattice:
         """Build the solid if it isn't yet, have the kernel check it too, and say what it is."""
         built = self._build(progress)
         valid = built.valid(progress)
+        refit, settings = built.refit, built.recipe.settings
         with built.timed("fit report"):
-            fit = fit_report(fit_patch(self.fit))
+            fit = fit_report(fit_patch(settings))
+            thickness, density, volume_exact = self.wall_thickness, self.volume_fraction, self.exact_volume
         return LatticeReport(
             cells=self.cells,
             cell_size=self.cell_size,
-            thickness=self.wall_thickness,
-            density=self.volume_fraction,
+            thickness=thickness,
+            thinnest=refit.thinnest if refit else thickness,
+            thickest=refit.thickest if refit else thickness,
+            density=density,
             patches=built.wall.complex.patch_count,
             faces=built.topology.faces,
             solids=built.topology.solids,
+            control_points=len(built.wall.weights),
             valid=valid,
             closed=built.topology.closed,
             free_edges=int(built.wall.complex.free.sum()),
             pinch_lines=built.wall.complex.pinch_lines,
             volume=built.volume,
-            volume_exact=self.exact_volume,
-            max_deviation=fit.max_distance * self.cell_size,
-            max_normal_angle=fit.max_normal_angle,
+            volume_exact=volume_exact,
+            max_deviation=refit.max_deviation if refit else fit.max_distance * self.cell_size,
+            max_wall_error=refit.max_wall_error if refit else None,
+            max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,
+            samples_per_patch=built.samples_per_patch,
             seconds=dict(built.seconds),
         )
 
@@ -243,34 +288,74 @@ class Lattice:
         ParameterError, FitError, KernelError, ExportError
         """
         targets = require_formats(paths)
-        usual = min(self.cell_size / 1000, self.wall_thickness / 10)
-        limit = usual if deviation is None else _number("deviation", deviation, "a length in mm")
+        limit = None if deviation is None else _number("deviation", deviation, "a length in mm")
         require_settings(self.cells, schema, limit, angle)
         built = self._build(progress)
-        built.write(targets, schema, limit, angle, progress)
+        usual = min(self.cell_size / 1000, built.thinnest / 10)
+        built.write(targets, schema, usual if limit is None else limit, angle, progress)
 
     def _build(self, progress: Progress | None = None) -> Build:
-        return build(self.cells, self.cell_size, self.wall_thickness, self.fit, progress)
+        settings = self.fit
+        if self.uniform and self.tolerance is not None:
+            settings = fit_within(settings, self.tolerance)
+        return build(Recipe(self.cells, self._grading(), settings, self.tolerance or USUAL_TOLERANCE), progress)
+
+    def _grading(self) -> Grading:
+        if self.uniform:
+            return Grading(self.cell_size, self.wall_thickness)
+        x, y, z = (n * self.cell_size for n in self.cells)
+        space = None if self.map is None else _over(self.map, (x, y, z))  # type: ignore[arg-type]
+        return Grading(self.cell_size, self.thickness, self.density, self.scale_field, space)  # type: ignore[arg-type]
+
+    def _measures(self) -> ExactMeasures:
+        return _measures(self.cells, self._grading())
+
+    def _require_fit(self) -> None:
+        if not isinstance(self.fit, FitSettings):
+            raise ParameterError("fit", self.fit, "a FitSettings")
+        if not self.uniform and not self.fit.plain:
+            raise ParameterError(
+                "fit",
+                self.fit,
+                "evenly spaced knots, equal weights and the smooth parameterisation where the lattice varies: "
+                "there the number of control points rises with the tolerance",
+            )
+        if self.tolerance is not None:
+            object.__setattr__(self, "tolerance", _number("tolerance", self.tolerance, "a part of the cell size"))
+            if not 0 < self.tolerance < 1:
+                raise ParameterError("tolerance", self.tolerance, "a part of the cell size, above 0 and below 1")
 
     def _require_sound_wall(self) -> None:
-        if self.density is not None:
-            if not 0 < self.density < LARGEST_DENSITY:
+        thickness = self.wall_thickness if self.density is None else None
+        if thickness is None:
+            density = self.volume_fraction
+            if not 0 < density < LARGEST_DENSITY:
                 raise ParameterError(
-                    "density", self.density, f"above 0 and below {LARGEST_DENSITY:.5f}, where the wall meets itself"
+                    "density", density, f"above 0 and below {LARGEST_DENSITY:.5f}, where the wall meets itself"
                 )
             if self.wall_thickness < THINNEST_WALL:
                 thinnest = density_of_thickness(THINNEST_WALL / self.cell_size)
-                raise ParameterError("density", self.density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
+                raise ParameterError("density", density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
             return
-        assert self.thickness is not None
         limit = LARGEST_THICKNESS * self.cell_size
-        if not THINNEST_WALL <= self.thickness < limit:
+        if not THINNEST_WALL <= thickness < limit:
             raise ParameterError(
                 "thickness",
-                self.thickness,
+                thickness,
                 f"{THINNEST_WALL:g} mm or more and below {limit:.5g} mm, "
                 f"the curvature limit {LARGEST_THICKNESS:.5f} x cell_size",
             )
+
+
+@lru_cache(maxsize=16)
+def _over(block_map: BlockMap, size: Corner) -> SpaceMap:
+    """The same object each time, so that equal lattices are built once."""
+    return block_map.over(size)
+
+
+@lru_cache(maxsize=16)
+def _measures(cells: tuple[int, int, int], grading: Grading) -> ExactMeasures:
+    return exact_measures(build_complex(cells, closed=grading.closed), grading)
 
 
 def _number(parameter: str, value: object, meaning: str) -> float:

@@ -15,7 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["NurbsCurve", "NurbsSurface", "basis", "edge_row", "gauss_points", "uniform_knots"]
+__all__ = [
+    "NurbsCurve",
+    "NurbsSurface",
+    "basis",
+    "edge_row",
+    "gauss_points",
+    "grid_derivatives",
+    "uniform_knots",
+]
 
 Floats = NDArray[np.float64]
 
@@ -259,6 +267,43 @@ class NurbsSurface:
 def edge_row(net: Floats, index: int) -> Floats:
     """The row of a net (its first two axes) that controls border curve ``index``, in running order."""
     return (net[:, 0], net[-1, :], net[::-1, -1], net[0, ::-1])[index]
+
+
+def grid_derivatives(
+    nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    """Points and first derivatives of many surfaces of one basis on one grid of parameters (A4.4).
+
+    Parameters
+    ----------
+    nets : ndarray, shape (..., n, m, 3)
+        Control points.
+    weights : ndarray, shape (n, m)
+    knots : tuple of ndarray
+        Along u and v.
+    u : array_like, shape (a,)
+    v : array_like, shape (b,)
+
+    Returns
+    -------
+    points, du, dv : ndarray, shape (..., a, b, 3)
+    """
+    n, m = nets.shape[-3:-1]
+    along_u, along_u_rate = (basis(knots[0], len(knots[0]) - n - 1, u, k) for k in (0, 1))
+    along_v, along_v_rate = (basis(knots[1], len(knots[1]) - m - 1, v, k) for k in (0, 1))
+
+    def products(rows: Floats, columns: Floats, net: Floats) -> Floats:
+        wide = (rows @ net.reshape(*net.shape[:-3], n, -1)).reshape(*net.shape[:-3], len(rows), m, -1)
+        return np.asarray(columns @ wide)
+
+    pairs = ((along_u, along_v), (along_u_rate, along_v), (along_u, along_v_rate))
+    if np.ptp(weights) == 0:
+        points, du, dv = (products(*pair, nets) for pair in pairs)
+        return points, du, dv
+    weight, weight_u, weight_v = (products(*pair, weights[..., np.newaxis]) for pair in pairs)
+    numerator, numerator_u, numerator_v = (products(*pair, nets * weights[..., np.newaxis]) for pair in pairs)
+    points = numerator / weight
+    return points, (numerator_u - weight_u * points) / weight, (numerator_v - weight_v * points) / weight
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -7,7 +7,11 @@ curvature into 2 pi chi). Lengths here are in cell sizes L.
 
 from __future__ import annotations
 
-from math import acos, cos, pi, sqrt
+from math import pi, sqrt
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gyroid_cad.weierstrass import GYROID, K_PRIME, K
 
@@ -21,6 +25,8 @@ __all__ = [
     "face_area",
     "thickness_of_density",
 ]
+
+Floats = NDArray[np.float64]
 
 # The associate surfaces are isometric: the area goes with the square of the scale.
 AREA_PER_CELL = 1.5 * (K / K_PRIME + K_PRIME / K)
@@ -51,22 +57,28 @@ def density_of_thickness(thickness: float) -> float:
 LARGEST_DENSITY = density_of_thickness(LARGEST_THICKNESS)
 
 
-def thickness_of_density(density: float) -> float:
+@overload
+def thickness_of_density(density: float) -> float: ...
+@overload
+def thickness_of_density(density: Floats) -> Floats: ...
+def thickness_of_density(density: float | Floats) -> float | Floats:
     """The inverse of :func:`density_of_thickness`, by Viete's formula for three real roots.
 
     Parameters
     ----------
-    density : float
+    density : float or ndarray
         From 0 to LARGEST_DENSITY.
 
     Returns
     -------
-    float
+    float or ndarray
         Whole wall, in cell sizes.
     """
     turning = sqrt(AREA_PER_CELL / (3 * _CUBIC))
     at_turning = 2 * _CUBIC * turning**3
-    return 2 * turning * cos((acos(-density / at_turning) - 2 * pi) / 3) if density else 0.0
+    thickness = 2 * turning * np.cos((np.arccos(-np.asarray(density) / at_turning) - 2 * pi) / 3)
+    thickness = np.where(np.asarray(density) == 0, 0.0, thickness)
+    return thickness if thickness.ndim else float(thickness)
 
 
 def face_area(thickness: float) -> float:

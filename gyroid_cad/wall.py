@@ -16,7 +16,7 @@ from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.complex import CellComplex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fit import FittedPatch, largest_offset, require_shared_edges
-from gyroid_cad.nurbs import NurbsSurface, basis, edge_row, gauss_points
+from gyroid_cad.nurbs import NurbsSurface, basis, edge_row, grid_derivatives
 from gyroid_cad.symmetry import QUARTER
 
 __all__ = ["SIDES", "Wall", "build_wall"]
@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SIDES = (0, 1)
+# So few that what is computed for them stays in the processor's cache.
+_NETS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,28 +78,36 @@ class Wall:
         Exact to rounding for polynomial nets: no kernel is asked.
         """
         uses = np.bincount(self.patch_net, minlength=len(self.nets))
-        volumes = [self._patch_volume(net) if uses[net] else 0.0 for net in range(len(self.nets))]
-        return float(uses @ np.array(volumes))
+        return float(
+            sum(
+                uses[first : first + _NETS_AT_ONCE]
+                @ _volumes(self.nets[first : first + _NETS_AT_ONCE], self.face(0, 0))
+                for first in range(0, len(self.nets), _NETS_AT_ONCE)
+            )
+        )
 
     def bounding_box(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner of the box round the wall, in mm, to about 1e-6 of its size."""
-        low, high = np.empty((len(self.nets), 3)), np.empty((len(self.nets), 3))
-        for net in range(len(self.nets)):
-            boxes = [_extent(self.face(net, side)) for side in SIDES]
-            low[net] = np.min([box[0] for box in boxes], axis=0)
-            high[net] = np.max([box[1] for box in boxes], axis=0)
+        # Surfaces lie in the box of their control points: only those that could reach furthest are looked at closely.
         shift = self.shifts[self.patch_shift]
-        return (low[self.patch_net] + shift).min(axis=0), (high[self.patch_net] + shift).max(axis=0)
+        bounds = []
+        for reaches, towards in ((np.min, 1), (np.max, -1)):
+            hull = towards * (reaches(self.nets, axis=(1, 2, 3))[self.patch_net] + shift)
+            bounds.append([towards * self._furthest(axis, towards, hull[:, axis]) for axis in range(3)])
+        return np.array(bounds[0]), np.array(bounds[1])
 
-    def _patch_volume(self, net: int) -> float:
-        u, v, weights = self.face(net, 0).quadrature()
-        below, above = (self.face(net, side).derivatives(u, v) for side in SIDES)
-        through = above[0, 0] - below[0, 0]
-        total = 0.0
-        for height, height_weight in zip(*gauss_points(np.array([0.0, 1.0]), 2), strict=True):
-            du, dv = ((1 - height) * below[i] + height * above[i] for i in ((1, 0), (0, 1)))
-            total += height_weight * float(np.sum(weights * np.sum(np.cross(du, dv) * through, axis=-1)))
-        return total
+    def _furthest(self, axis: int, towards: int, hull: Floats) -> float:
+        """Least value of ``towards`` times a coordinate over all faces, given what their control points reach."""
+        furthest = np.inf
+        known: dict[int, float] = {}
+        for patch in np.argsort(hull).tolist():
+            if hull[patch] >= furthest:
+                break
+            net = int(self.patch_net[patch])
+            if net not in known:
+                known[net] = min(towards * _extreme(self.face(net, side), axis, towards) for side in SIDES)
+            furthest = min(furthest, known[net] + towards * float(self.shifts[self.patch_shift[patch], axis]))
+        return furthest
 
 
 def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thickness: float) -> Wall:
@@ -151,20 +161,28 @@ def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thick
     )
 
 
-def _extent(surface: NurbsSurface, samples: int = 25, rounds: int = 4) -> tuple[Floats, Floats]:
-    """Box of a surface on [-1, 1]^2: a grid of samples, refined round each extreme one."""
-    low, high = np.empty(3), np.empty(3)
-    for axis in range(3):
-        for bound, best in ((low, np.argmin), (high, np.argmax)):
-            centre_u = centre_v = 0.0
-            reach = 1.0
-            for _ in range(rounds):
-                u, v = (np.clip(centre + reach * np.linspace(-1, 1, samples), -1, 1) for centre in (centre_u, centre_v))
-                values = _grid_coordinate(surface, u, v, axis)
-                i, j = np.unravel_index(best(values), values.shape)
-                centre_u, centre_v, reach = float(u[i]), float(v[j]), reach * 3 / samples
-                bound[axis] = values[i, j]
-    return low, high
+def _volumes(nets: Floats, like: NurbsSurface) -> Floats:
+    """Volume between the two faces of each net; shape (nets,)."""
+    u, v, weights = like.quadrature()
+    knots = (like.knots_u, like.knots_v)
+    below, above = np.moveaxis(nets, 1, 0)
+    _, middle_u, middle_v = grid_derivatives((above + below) / 2, like.weights, knots, u.ravel(), v.ravel())
+    half, half_u, half_v = grid_derivatives((above - below) / 2, like.weights, knots, u.ravel(), v.ravel())
+    # The integral over s from -1 to 1 of (M_u + s H_u) x (M_v + s H_v) . H.
+    area = 2 * np.cross(middle_u, middle_v) + 2 / 3 * np.cross(half_u, half_v)
+    return np.asarray(np.einsum("uv,puvc,puvc->p", weights, area, half))
+
+
+def _extreme(surface: NurbsSurface, axis: int, towards: int, samples: int = 25, rounds: int = 4) -> float:
+    """Least (``towards`` 1) or largest (-1) coordinate on [-1, 1]^2: samples, refined round the extreme one."""
+    centre_u = centre_v = best = 0.0
+    reach = 1.0
+    for _ in range(rounds):
+        u, v = (np.clip(centre + reach * np.linspace(-1, 1, samples), -1, 1) for centre in (centre_u, centre_v))
+        values = _grid_coordinate(surface, u, v, axis)
+        i, j = np.unravel_index(np.argmin(towards * values), values.shape)
+        centre_u, centre_v, reach, best = float(u[i]), float(v[j]), reach * 3 / samples, float(values[i, j])
+    return best
 
 
 def _grid_coordinate(surface: NurbsSurface, u: Floats, v: Floats, axis: int) -> Floats:

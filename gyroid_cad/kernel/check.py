@@ -26,10 +26,14 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
+from gyroid_cad.nurbs import NurbsSurface, grid_derivatives
 
 __all__ = ["Topology", "enclosed_volume", "is_valid", "topology"]
 
 Floats = NDArray[np.float64]
+
+# So few that what is computed for them stays in the processor's cache.
+_SURFACES_AT_ONCE = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,30 +94,42 @@ def enclosed_volume(shape: TopoDS_Shape) -> float:
     KernelError
         If a face is something else.
     """
-    fluxes: dict[int, tuple[Geom_BSplineSurface, float, Floats]] = {}
-    volume = 0.0
+    surfaces: dict[int, Geom_BSplineSurface] = {}
+    uses = []
     for part in _parts(shape, TopAbs_FACE):
         face = TopoDS.Face_s(part)
         location = TopLoc_Location()
         surface = BRep_Tool.Surface_s(face, location)
-        if id(surface) not in fluxes:
-            if not isinstance(surface, Geom_BSplineSurface):
-                raise KernelError(f"volume of a face on a {type(surface).__name__}: only B-spline faces are summed")
-            # The surface is kept alive with its flux, so that its id stays its own.
-            fluxes[id(surface)] = (surface, *_flux(surface))
-        _, flux, area = fluxes[id(surface)]
-        value = _placed_flux(flux, area, location)
-        volume += -value if face.Orientation() == TopAbs_REVERSED else value
-    return float(volume)
+        if not isinstance(surface, Geom_BSplineSurface):
+            raise KernelError(f"volume of a face on a {type(surface).__name__}: only B-spline faces are summed")
+        # Kept alive, so that its id stays its own.
+        surfaces[id(surface)] = surface
+        uses.append((id(surface), location, face.Orientation() == TopAbs_REVERSED))
+    fluxes = dict(zip(surfaces, _fluxes([nurbs_of_surface(surface) for surface in surfaces.values()]), strict=True))
+    signed = (
+        (-1 if backwards else 1) * _placed_flux(*fluxes[surface], location) for surface, location, backwards in uses
+    )
+    return float(sum(signed))
 
 
-def _flux(surface: Geom_BSplineSurface) -> tuple[float, Floats]:
-    """Flux of p/3 through the surface, and its area vector, both towards du x dv."""
-    nurbs = nurbs_of_surface(surface)
-    u, v, weights = nurbs.quadrature()
-    d = nurbs.derivatives(u, v)
-    area = np.cross(d[1, 0], d[0, 1]) * weights[..., np.newaxis]
-    return float(np.sum(d[0, 0] * area)) / 3, area.sum(axis=(0, 1))
+def _fluxes(surfaces: list[NurbsSurface]) -> list[tuple[float, Floats]]:
+    """Flux of p/3 through each surface, and its area vector, both towards du x dv."""
+    alike: dict[tuple[bytes, ...], list[int]] = {}
+    for index, surface in enumerate(surfaces):
+        key = (surface.knots_u.tobytes(), surface.knots_v.tobytes(), surface.weights.tobytes())
+        alike.setdefault(key, []).append(index)
+    found: dict[int, tuple[float, Floats]] = {}
+    for indices in alike.values():
+        for first in range(0, len(indices), _SURFACES_AT_ONCE):
+            chosen = indices[first : first + _SURFACES_AT_ONCE]
+            one = surfaces[chosen[0]]
+            u, v, weights = one.quadrature()
+            nets = np.stack([surfaces[index].control_points for index in chosen])
+            points, du, dv = grid_derivatives(nets, one.weights, (one.knots_u, one.knots_v), u.ravel(), v.ravel())
+            area = np.cross(du, dv) * weights[..., np.newaxis]
+            flux = np.einsum("puvc,puvc->p", points, area) / 3
+            found.update(zip(chosen, zip(flux.tolist(), area.sum(axis=(1, 2)), strict=True), strict=True))
+    return [found[index] for index in range(len(surfaces))]
 
 
 def _placed_flux(flux: float, area: Floats, location: TopLoc_Location) -> float:

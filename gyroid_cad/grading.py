@@ -1,0 +1,223 @@
+"""What varies over a lattice: wall, cell size, and the space it is carried to.
+
+All fields are functions of the place in the lattice's own flat space, in mm, before any map. First the scale field
+s carries a point p to s(p) p, the paper's variable bounding-cell length; then the map of space carries on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import SoundnessError
+from gyroid_cad.fields import Field, constant, evaluated
+from gyroid_cad.maps import SpaceMap, carried, differences
+from gyroid_cad.tube import LARGEST_DENSITY, thickness_of_density
+
+__all__ = ["THINNEST_WALL", "Grading", "Laid"]
+
+Floats = NDArray[np.float64]
+
+# Of differences, in cell sizes: their error, about its square, is far below any fit's; the rounding they amplify, which
+# neighbouring patches do not share, stays near 1e-12.
+_STEP = 2e-4
+# In mm. The kernel takes lengths under 1e-7 mm for nothing; this keeps every wall well above.
+THINNEST_WALL = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """The mid-surface where it is wanted.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        In mm.
+    normals : ndarray, shape (n, 3)
+        Unit normals of the mapped surface.
+    thickness : ndarray, shape (n,)
+        Whole wall in mm.
+    """
+
+    points: Floats
+    normals: Floats
+    thickness: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Grading:
+    """How the wall and the space vary.
+
+    Attributes
+    ----------
+    cell_size : float
+        Period of the lattice before any map, in mm.
+    thickness : float or Field, optional
+        Whole wall in mm.
+    density : float or Field, optional
+        Volume fraction instead of thickness.
+    scale_field : float or Field, optional
+        Factor on the position, without unit.
+    map : SpaceMap, optional
+    """
+
+    cell_size: float
+    thickness: float | Field | None = None
+    density: float | Field | None = None
+    scale_field: float | Field | None = None
+    map: SpaceMap | None = None
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every cell is like every other: a constant wall in flat space."""
+        return not isinstance(self.thickness, Field | None) and self.scale_field is None and self.map is None
+
+    @property
+    def closed(self) -> tuple[bool, bool, bool]:
+        """Along which axes the map joins the block's ends; a scale that varies would part them again."""
+        if self.map is None or self.scale_field is not None:
+            return False, False, False
+        return self.map.closed
+
+    def lay(self, points: Floats, normals: Floats) -> Laid:
+        """Carry points of the mid-surface and their normals to where they are wanted.
+
+        Parameters
+        ----------
+        points, normals : ndarray, shape (n, 3)
+            In the lattice's own space; points in mm, unit normals.
+
+        Returns
+        -------
+        Laid
+
+        Raises
+        ------
+        ParameterError
+            If a field or the map gives something else than finite real numbers.
+        SoundnessError
+            If the map turns space inside out, or a thickness or density is outside its range.
+        """
+        images, jacobian, determinant = self.carry(points)
+        if jacobian is None:
+            return Laid(points, normals, self._thickness(points, 1.0))
+        turned = _turned(jacobian, np.ascontiguousarray(normals.T))
+        growth = np.sqrt(np.sum(turned * turned, axis=0))
+        return Laid(images.T, (turned / growth).T, self._thickness(points, determinant / growth))
+
+    def carry(self, points: Floats) -> tuple[Floats, Floats | None, Floats | float]:
+        """Images of points, and the Jacobian and its determinant there, component first.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+
+        Returns
+        -------
+        images : ndarray, shape (3, n)
+        jacobian : ndarray, shape (3, 3, n)
+            None in flat space.
+        determinant : ndarray, shape (n,)
+            1 in flat space.
+
+        Raises
+        ------
+        ParameterError
+        SoundnessError
+            If the determinant is not positive everywhere.
+        """
+        images = np.ascontiguousarray(points.T)
+        jacobian: Floats | None = None
+        determinant: Floats | float = 1.0
+        if self.scale_field is not None:
+            images, jacobian = self._scaled(images)
+            determinant = _positive_determinant("scale_field", jacobian, points)
+        if self.map is not None:
+            images, onward = carried("map", self.map, images, _STEP * self.cell_size)
+            determinant = determinant * _positive_determinant("map", onward, points)
+            jacobian = onward if jacobian is None else np.einsum("ijn,jkn->ikn", onward, jacobian)
+        return images, jacobian, determinant
+
+    def _scaled(self, places: Floats) -> tuple[Floats, Floats]:
+        """p -> s(p) p, whose Jacobian is s I + p (grad s)^T."""
+        field = _as_field(self.scale_field)
+
+        def scale(points: Floats) -> Floats:
+            return evaluated("scale_field", field, points.T)
+
+        factor, slope = scale(places), differences(scale, places, _STEP * self.cell_size)
+        _require("scale_field", factor, places.T, 0.0, "above", "everywhere in the lattice")
+        jacobian = places[:, np.newaxis] * slope
+        for axis in range(3):
+            jacobian[axis, axis] += factor
+        return factor * places, jacobian
+
+    def asked(self, points: Floats) -> Floats:
+        """The thickness in mm, or the density, asked for at points of the lattice's own space; shape (n,).
+
+        Raises
+        ------
+        ParameterError
+        SoundnessError
+            If it is not positive everywhere, or a density past the largest.
+        """
+        parameter = "thickness" if self.thickness is not None else "density"
+        values = evaluated(parameter, _as_field(self.thickness if self.density is None else self.density), points)
+        if self.density is None:
+            _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall")
+            return values
+        _require(parameter, values, points, 0.0, "above", "everywhere in the lattice")
+        worst = int(np.argmax(values))
+        if values[worst] >= LARGEST_DENSITY:
+            reason = "the density at which the wall meets itself"
+            raise SoundnessError(parameter, float(values[worst]), _place(points, worst), LARGEST_DENSITY, reason)
+        return values
+
+    def _thickness(self, points: Floats, spacing: Floats | float) -> Floats:
+        asked = self.asked(points)
+        if self.density is None:
+            return asked
+        # The wall is stretched with the space across it, as if it had been mapped itself: so the volume
+        # fraction is kept, to first order in the thickness, however the map stretches.
+        thickness = np.asarray(thickness_of_density(asked) * self.cell_size * spacing)
+        _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall in mm", "thickness")
+        return thickness
+
+
+def _as_field(value: float | Field | None) -> Field:
+    assert value is not None
+    return value if isinstance(value, Field) else constant(value)
+
+
+def _turned(jacobian: Floats, normals: Floats) -> Floats:
+    """Cofactors of the Jacobian times the normals, det(J) J^-T n: the area vector of the mapped surface."""
+    x, y, z = jacobian[:, 0], jacobian[:, 1], jacobian[:, 2]
+    return np.asarray(normals[0] * _cross(y, z) + normals[1] * _cross(z, x) + normals[2] * _cross(x, y))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _positive_determinant(parameter: str, jacobian: Floats, points: Floats) -> Floats:
+    determinant = np.sum(jacobian[:, 0] * _cross(jacobian[:, 1], jacobian[:, 2]), axis=0)
+    reason, quantity = "where space is turned inside out", "Jacobian determinant"
+    _require(parameter, determinant, points, 0.0, "above", reason, quantity)
+    return np.asarray(determinant)
+
+
+def _require(
+    parameter: str, values: Floats, points: Floats, limit: float, accepted: str, reason: str, quantity: str = ""
+) -> None:
+    """Refuse values that are not "above", or not "at least", a limit everywhere."""
+    worst = int(np.argmin(values))
+    if not (values[worst] > limit or (accepted == "at least" and values[worst] == limit)):
+        place = _place(points, worst)
+        raise SoundnessError(parameter, float(values[worst]), place, limit, reason, accepted, quantity)
+
+
+def _place(points: Floats, index: int) -> tuple[float, float, float]:
+    x, y, z = points[index].tolist()
+    return x, y, z

@@ -1,0 +1,73 @@
+"""What a lattice turned out to be, as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+__all__ = ["LatticeReport"]
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeReport:
+    """What was built, and how exactly.
+
+    Attributes
+    ----------
+    cells : tuple of int
+    cell_size : float
+        In mm, before any map.
+    thickness, thinnest, thickest : float
+        Whole wall in mm: its mean over the mid-surface and its extremes.
+    density : float
+        Volume fraction: of a cell, or of the mapped block where the lattice varies.
+    patches, faces, solids : int
+    control_points : int
+        Along each side of a patch.
+    valid, closed : bool
+        By the kernel's own check; every edge bounds exactly two faces.
+    free_edges : int
+        Mid-surface edges that bound one patch only: each carries a ruled side wall.
+    pinch_lines : int
+        Lines through the wall in which patches touch without joining.
+    volume, volume_exact : float
+        In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
+        where the lattice varies.
+    max_deviation : float
+        In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice varies.
+    max_wall_error : float, optional
+        Relative, of the wall along the exact normal; where the lattice varies.
+    max_normal_angle : float
+        In degrees, between fitted and exact normal of the mid-surface.
+    samples_per_patch : dict
+        At how many places of every patch deviation, folding and clearance between walls were checked; empty where
+        they hold in closed form.
+    seconds : dict
+        By stage.
+    """
+
+    cells: tuple[int, int, int]
+    cell_size: float
+    thickness: float
+    thinnest: float
+    thickest: float
+    density: float
+    patches: int
+    faces: int
+    solids: int
+    control_points: int
+    valid: bool
+    closed: bool
+    free_edges: int
+    pinch_lines: int
+    volume: float
+    volume_exact: float
+    max_deviation: float
+    max_wall_error: float | None
+    max_normal_angle: float
+    samples_per_patch: dict[str, int]
+    seconds: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain values, ready for JSON."""
+        return asdict(self)

@@ -13,8 +13,7 @@ from gyroid_cad.version import __version__
 if TYPE_CHECKING:
     from gyroid_cad.block_maps import Bend, Cylinder, Sphere, Twist
     from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SoundnessError
-    from gyroid_cad.fields import (
-        Field,
+    from gyroid_cad.field_makers import (
         between_planes,
         constant,
         distance_from_axis,
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
         smooth_maximum,
         smooth_minimum,
     )
+    from gyroid_cad.fields import Field
     from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.maps import SpaceMap
@@ -67,8 +67,8 @@ __all__ = [
 _HOMES = {
     "block_maps": ("Bend", "Cylinder", "Sphere", "Twist"),
     "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"),
-    "fields": (
-        "Field",
+    "fields": ("Field",),
+    "field_makers": (
         "between_planes",
         "constant",
         "distance_from_axis",

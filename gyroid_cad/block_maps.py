@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from math import isfinite, pi, radians
-from numbers import Real
+from math import pi, radians
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.maps import BlockMap, Size, SpaceMap
 
@@ -43,9 +43,9 @@ class Cylinder:
     angle: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", _positive("radius", self.radius, "mm"))
+        object.__setattr__(self, "radius", positive_number("radius", self.radius, "a finite number of mm above 0"))
         if self.angle is not None:
-            object.__setattr__(self, "angle", _turn("angle", self.angle))
+            object.__setattr__(self, "angle", _turn(self.angle))
 
     def over(self, size: Size) -> SpaceMap:
         """The wrap of a block of this size, closed if it takes up the full turn.
@@ -90,9 +90,9 @@ class Sphere:
     angle: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", _positive("radius", self.radius, "mm"))
+        object.__setattr__(self, "radius", positive_number("radius", self.radius, "a finite number of mm above 0"))
         if self.angle is not None:
-            object.__setattr__(self, "angle", _turn("angle", self.angle))
+            object.__setattr__(self, "angle", _turn(self.angle))
 
     def over(self, size: Size) -> SpaceMap:
         """The patch of a sphere under a block of this size, closed if it takes up the whole equator.
@@ -140,7 +140,7 @@ class Twist:
     angle: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angle", _finite("angle", self.angle, "degrees"))
+        object.__setattr__(self, "angle", finite_number("angle", self.angle, "a finite number of degrees"))
 
     def over(self, size: Size) -> SpaceMap:
         """The twist of a block of this size."""
@@ -177,7 +177,7 @@ class Bend:
     angle: float
 
     def __post_init__(self) -> None:
-        angle = _finite("angle", self.angle, "degrees")
+        angle = finite_number("angle", self.angle, "a finite number of degrees")
         if not 0 < abs(angle) <= FULL_TURN:
             raise ParameterError("angle", angle, "-360 to 360 degrees, not 0")
         object.__setattr__(self, "angle", angle)
@@ -248,7 +248,8 @@ def as_map(value: object) -> BlockMap:
     if isinstance(value, str):
         return parse_map(value)
     if callable(value):
-        return SpaceMap(value)
+        # Maps are remembered by what they are made of, so of one that can't be its bound method is.
+        return SpaceMap(value if isinstance(value, Hashable) else value.__call__)
     raise ParameterError("map", value, f"a SpaceMap, {', '.join(MAPS)}, or a function of x, y, z")
 
 
@@ -280,21 +281,9 @@ def _round(block_map: Cylinder | Sphere, length: float) -> tuple[float, bool]:
     return 1 / block_map.radius, False
 
 
-def _finite(parameter: str, value: object, unit: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
-        raise ParameterError(parameter, value, f"a finite number of {unit}")
-    return float(value)
-
-
-def _positive(parameter: str, value: object, unit: str) -> float:
-    number = _finite(parameter, value, unit)
-    if not number > 0:
-        raise ParameterError(parameter, value, f"a number of {unit} above 0")
-    return number
-
-
-def _turn(parameter: str, value: object) -> float:
-    number = _positive(parameter, value, "degrees")
+def _turn(angle: object) -> float:
+    accepted = f"degrees above 0, at most {FULL_TURN:g}"
+    number = positive_number("angle", angle, accepted)
     if number > FULL_TURN:
-        raise ParameterError(parameter, value, f"at most {FULL_TURN:g} degrees")
+        raise ParameterError("angle", angle, accepted)
     return number

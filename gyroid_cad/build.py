@@ -179,6 +179,7 @@ class Build:
         from gyroid_cad.kernel.step import write_step
         from gyroid_cad.kernel.stl import write_stl
 
+        _require_memory(self.cells, _FILE_BYTES_PER_CELL, len(self.wall.weights))
         if not self.valid(progress):
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:

@@ -25,6 +25,7 @@ PROGRAM = "gyroid-cad"
 _UNWRAPPED = 100_000
 DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
 
+_CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 
@@ -39,7 +40,7 @@ def commands() -> None:
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
     """What a file says takes the place of defaults, so that options on the command line override it."""
-    if path is not None:
+    if path is not None and path.lower().endswith(_CONFIG_ENDING):
         from gyroid_cad.config import read_config
 
         values = read_config(path, _LATTICE_KEYS)
@@ -124,13 +125,15 @@ def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **
     gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
     """
     start = time.perf_counter()
+    if config is not None and not config.lower().endswith(_CONFIG_ENDING):
+        raise click.UsageError(f"Got unexpected extra argument '{config}'; a lattice in a file ends in .toml.")
     if not (given["output"] or print_config):
         raise click.UsageError("Missing option '-o' / '--output'.")
     lattice = _lattice(given)
     if print_config:
         from gyroid_cad.config import printed_config
 
-        click.echo(printed_config(given), nl=False)
+        click.echo(printed_config({p.name: given[p.name] for p in build.params if p.name in given}), nl=False)
         return
     outputs = given["output"]
     settings = {name: given[name] for name in ("schema", "deviation", "angle")}
@@ -290,6 +293,7 @@ def _print_summary(summary: dict[str, Any]) -> None:
         ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
         ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
         ("deviation", _deviation(summary)),
+        *(([("checked", _checks(summary["samples_per_patch"]))]) if summary["samples_per_patch"] else []),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
         ("time", f"{summary['seconds']['total']:.2f} s"),
     ]
@@ -308,6 +312,13 @@ def _deviation(summary: dict[str, Any]) -> str:
     if summary["max_wall_error"] is not None:
         shown += f", wall {summary['max_wall_error']:.1e} of itself"
     return f"{shown}; {n} x {n} control points a patch"
+
+
+def _checks(samples: dict[str, int]) -> str:
+    return (
+        f"at {samples['deviation']} places a patch for deviation, {samples['fold']} for folding, "
+        f"{samples['clearance']} for walls that meet"
+    )
 
 
 def _print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]) -> None:

@@ -23,7 +23,7 @@ class ParameterError(GyroidError, ValueError):
     """
 
     def __init__(self, parameter: str, value: object, accepted: str) -> None:
-        shown = " ".join(repr(value).split())
+        shown = " ".join(_shown(value).split())
         if len(shown) > 120:
             shown = shown[:117] + "..."
         super().__init__(f"{parameter} = {shown}: expected {accepted}")
@@ -69,7 +69,7 @@ class SoundnessError(ParameterError):
         unit: str = "",
     ) -> None:
         subject = f"{parameter}: {quantity}" if quantity else parameter
-        where = ", ".join(f"{coordinate:.6g}" for coordinate in place)
+        where = ", ".join(f"{round(coordinate, 9) + 0.0:.6g}" for coordinate in place)
         Exception.__init__(
             self,
             f"{subject} = {value:.6g}{unit} at (x, y, z) = ({where}) mm: "
@@ -102,3 +102,10 @@ class KernelError(GyroidError, RuntimeError):
 
 class ExportError(GyroidError, OSError):
     """A file that could not be written; nothing was left behind and nothing older was touched."""
+
+
+def _shown(value: object) -> str:
+    try:
+        return repr(value)
+    except ValueError:  # a whole number of more digits than Python prints
+        return f"a {type(value).__name__} too long to print"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import SoundnessError
-from gyroid_cad.fields import Field, constant, evaluated
+from gyroid_cad.fields import Field, evaluated
 from gyroid_cad.maps import SpaceMap, carried, differences
 from gyroid_cad.tube import LARGEST_DENSITY, thickness_of_density
 
@@ -142,10 +142,9 @@ class Grading:
 
     def _scaled(self, places: Floats) -> tuple[Floats, Floats]:
         """p -> s(p) p, whose Jacobian is s I + p (grad s)^T."""
-        field = _as_field(self.scale_field)
 
         def scale(points: Floats) -> Floats:
-            return evaluated("scale_field", field, points.T)
+            return _values("scale_field", self.scale_field, points.T)
 
         factor, slope = scale(places), differences(scale, places, _STEP * self.cell_size)
         _require("scale_field", factor, places.T, 0.0, "above", "everywhere in the lattice")
@@ -164,7 +163,7 @@ class Grading:
             If it is not positive everywhere, or a density past the largest.
         """
         parameter = "thickness" if self.thickness is not None else "density"
-        values = evaluated(parameter, _as_field(self.thickness if self.density is None else self.density), points)
+        values = _values(parameter, self.thickness if self.density is None else self.density, points)
         if self.density is None:
             _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall")
             return values
@@ -186,9 +185,11 @@ class Grading:
         return thickness
 
 
-def _as_field(value: float | Field | None) -> Field:
+def _values(parameter: str, value: float | Field | None, points: Floats) -> Floats:
+    if isinstance(value, Field):
+        return evaluated(parameter, value, points)
     assert value is not None
-    return value if isinstance(value, Field) else constant(value)
+    return np.full(len(points), value)
 
 
 def _turned(jacobian: Floats, normals: Floats) -> Floats:

@@ -6,24 +6,25 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import inf, isfinite, nan, prod
-from numbers import Integral, Real
+from math import prod
 from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
 from gyroid_cad.block_maps import as_map
 from gyroid_cad.build import Build, Progress, Recipe, build, require_formats, require_settings
+from gyroid_cad.checks import finite_number
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
 from gyroid_cad.fields import Field, as_field
-from gyroid_cad.fit import FitSettings, fit_patch, fit_report, fit_within
-from gyroid_cad.grading import THINNEST_WALL, Grading
+from gyroid_cad.fit import FitSettings, fit_within
+from gyroid_cad.grading import Grading
+from gyroid_cad.limits import require_cell_size, require_density, require_thickness, whole_cells
 from gyroid_cad.maps import BlockMap, SpaceMap
 from gyroid_cad.paper import paper_units
-from gyroid_cad.report import LatticeReport
-from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, density_of_thickness, thickness_of_density
+from gyroid_cad.report import LatticeReport, report_of
+from gyroid_cad.tube import density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
@@ -35,11 +36,9 @@ Corner = tuple[float, float, float]
 FieldLike = float | str | Field | Callable[..., ArrayLike]
 MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
-# The kernel takes lengths under 1e-7 mm for nothing; these keep every edge and wall well above.
-SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
-MOST_CELLS_ALONG = 1_000_000
 # Of a lattice that varies, in cell sizes.
 USUAL_TOLERANCE = 1e-4
+_LENGTH = "a length in mm, a finite number"
 _FIELDS = {
     "thickness": "a length in mm",
     "density": "a volume fraction",
@@ -96,10 +95,11 @@ class Lattice:
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", _validated_cells(self.cells))
-        object.__setattr__(self, "cell_size", _number("cell_size", self.cell_size, "a length in mm"))
-        if not SMALLEST_CELL <= self.cell_size <= LARGEST_CELL:
-            raise ParameterError("cell_size", self.cell_size, f"{SMALLEST_CELL:g} to {LARGEST_CELL:g} mm")
+        object.__setattr__(self, "cells", whole_cells(self.cells))
+        object.__setattr__(
+            self, "cell_size", finite_number("cell_size", self.cell_size, "a length in mm, a finite number")
+        )
+        require_cell_size(self.cell_size)
         if (self.thickness is None) == (self.density is None):
             given = {"thickness": self.thickness, "density": self.density}
             raise ParameterError("thickness, density", given, "exactly one of the two")
@@ -109,10 +109,12 @@ class Lattice:
         if self.map is not None:
             object.__setattr__(self, "map", as_map(self.map))
         self._require_fit()
-        if self.uniform:
-            self._require_sound_wall()
-        else:
+        if not self.uniform:
             self._grading()
+        elif self.density is None:
+            require_thickness(self.wall_thickness, self.cell_size)
+        else:
+            require_density(self.volume_fraction, self.cell_size)
 
     @classmethod
     def paper(
@@ -229,34 +231,10 @@ class Lattice:
     def report(self, progress: Progress | None = None) -> LatticeReport:
         """Build the solid if it isn't yet, have the kernel check it too, and say what it is."""
         built = self._build(progress)
-        valid = built.valid(progress)
-        refit, settings = built.refit, built.recipe.settings
+        built.valid(progress)
         with built.timed("fit report"):
-            fit = fit_report(fit_patch(settings))
-            thickness, density, volume_exact = self.wall_thickness, self.volume_fraction, self.exact_volume
-        return LatticeReport(
-            cells=self.cells,
-            cell_size=self.cell_size,
-            thickness=thickness,
-            thinnest=refit.thinnest if refit else thickness,
-            thickest=refit.thickest if refit else thickness,
-            density=density,
-            patches=built.wall.complex.patch_count,
-            faces=built.topology.faces,
-            solids=built.topology.solids,
-            control_points=len(built.wall.weights),
-            valid=valid,
-            closed=built.topology.closed,
-            free_edges=int(built.wall.complex.free.sum()),
-            pinch_lines=built.wall.complex.pinch_lines,
-            volume=built.volume,
-            volume_exact=volume_exact,
-            max_deviation=refit.max_deviation if refit else fit.max_distance * self.cell_size,
-            max_wall_error=refit.max_wall_error if refit else None,
-            max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,
-            samples_per_patch=built.samples_per_patch,
-            seconds=dict(built.seconds),
-        )
+            measures = (self.wall_thickness, self.volume_fraction, self.exact_volume)
+        return report_of(built, *measures)
 
     def write(
         self,
@@ -288,7 +266,7 @@ class Lattice:
         ParameterError, FitError, KernelError, ExportError
         """
         targets = require_formats(paths)
-        limit = None if deviation is None else _number("deviation", deviation, "a length in mm")
+        limit = None if deviation is None else finite_number("deviation", deviation, _LENGTH)
         require_settings(self.cells, schema, limit, angle)
         built = self._build(progress)
         usual = min(self.cell_size / 1000, built.thinnest / 10)
@@ -321,30 +299,10 @@ class Lattice:
                 "there the number of control points rises with the tolerance",
             )
         if self.tolerance is not None:
-            object.__setattr__(self, "tolerance", _number("tolerance", self.tolerance, "a part of the cell size"))
+            accepted = "a part of the cell size, a finite number above 0 and below 1"
+            object.__setattr__(self, "tolerance", finite_number("tolerance", self.tolerance, accepted))
             if not 0 < self.tolerance < 1:
-                raise ParameterError("tolerance", self.tolerance, "a part of the cell size, above 0 and below 1")
-
-    def _require_sound_wall(self) -> None:
-        thickness = self.wall_thickness if self.density is None else None
-        if thickness is None:
-            density = self.volume_fraction
-            if not 0 < density < LARGEST_DENSITY:
-                raise ParameterError(
-                    "density", density, f"above 0 and below {LARGEST_DENSITY:.5f}, where the wall meets itself"
-                )
-            if self.wall_thickness < THINNEST_WALL:
-                thinnest = density_of_thickness(THINNEST_WALL / self.cell_size)
-                raise ParameterError("density", density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
-            return
-        limit = LARGEST_THICKNESS * self.cell_size
-        if not THINNEST_WALL <= thickness < limit:
-            raise ParameterError(
-                "thickness",
-                thickness,
-                f"{THINNEST_WALL:g} mm or more and below {limit:.5g} mm, "
-                f"the curvature limit {LARGEST_THICKNESS:.5f} x cell_size",
-            )
+                raise ParameterError("tolerance", self.tolerance, accepted)
 
 
 @lru_cache(maxsize=16)
@@ -356,25 +314,3 @@ def _over(block_map: BlockMap, size: Corner) -> SpaceMap:
 @lru_cache(maxsize=16)
 def _measures(cells: tuple[int, int, int], grading: Grading) -> ExactMeasures:
     return exact_measures(build_complex(cells, closed=grading.closed), grading)
-
-
-def _number(parameter: str, value: object, meaning: str) -> float:
-    try:
-        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else nan
-    except OverflowError:
-        number = inf
-    if not isfinite(number):
-        raise ParameterError(parameter, value, f"{meaning}, a finite number")
-    return number
-
-
-def _validated_cells(cells: Sequence[int]) -> tuple[int, int, int]:
-    accepted = f"three whole numbers, each from 1 to {MOST_CELLS_ALONG}"
-    try:
-        counts = tuple(cells)
-    except TypeError:
-        raise ParameterError("cells", cells, accepted) from None
-    whole = all(isinstance(n, Integral) and not isinstance(n, bool) and 1 <= n <= MOST_CELLS_ALONG for n in counts)
-    if len(counts) != 3 or not whole:
-        raise ParameterError("cells", cells, accepted)
-    return int(counts[0]), int(counts[1]), int(counts[2])

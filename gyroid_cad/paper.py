@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
-from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.checks import positive_number
 from gyroid_cad.fields import Field, as_field
 
 __all__ = ["PaperUnits", "paper_units"]
@@ -76,15 +74,11 @@ def paper_units(
     ------
     ParameterError
     """
-    if isinstance(scale, bool) or not isinstance(scale, Real) or not 0 < scale < inf:
-        raise ParameterError("scale", scale, "a finite number of mm per unit of BC length, above 0")
+    scale = positive_number("scale", scale, "a finite number of mm per unit of BC length, above 0")
     thickness = as_field("thickness_factor", thickness_factor, "the wall in BC units")
     length = as_field("bc_length", bc_length, "a length in BC units")
-    scale = float(scale)
     if isinstance(length, float):
-        if not 0 < length < inf:
-            raise ParameterError("bc_length", bc_length, "a length in BC units above 0")
-        unit, scale_field = length * scale, None
+        unit, scale_field = positive_number("bc_length", length, "a length in BC units above 0") * scale, None
     else:
         unit, scale_field = scale, _in_units(length, scale, 1.0)
     wall = thickness * scale if isinstance(thickness, float) else _in_units(thickness, unit, scale)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-__all__ = ["LatticeReport"]
+from gyroid_cad.build import Build
+from gyroid_cad.fit import fit_patch, fit_report
+
+__all__ = ["LatticeReport", "report_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,3 +74,41 @@ class LatticeReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
         return asdict(self)
+
+
+def report_of(built: Build, thickness: float, density: float, volume_exact: float) -> LatticeReport:
+    """The report on what was built and checked.
+
+    Parameters
+    ----------
+    built : Build
+    thickness, density, volume_exact : float
+        Of the exact lattice.
+    """
+    refit, complex = built.refit, built.complex
+    with built.timed("fit report"):
+        fit = fit_report(fit_patch(built.recipe.settings))
+    cell_size = built.recipe.grading.cell_size
+    return LatticeReport(
+        cells=built.cells,
+        cell_size=cell_size,
+        thickness=thickness,
+        thinnest=refit.thinnest if refit else thickness,
+        thickest=refit.thickest if refit else thickness,
+        density=density,
+        patches=complex.patch_count,
+        faces=built.topology.faces,
+        solids=built.topology.solids,
+        control_points=len(built.wall.weights),
+        valid=built.valid(),
+        closed=built.topology.closed,
+        free_edges=int(complex.free.sum()),
+        pinch_lines=complex.pinch_lines,
+        volume=built.volume,
+        volume_exact=volume_exact,
+        max_deviation=refit.max_deviation if refit else fit.max_distance * cell_size,
+        max_wall_error=refit.max_wall_error if refit else None,
+        max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,
+        samples_per_patch=built.samples_per_patch,
+        seconds=dict(built.seconds),
+    )

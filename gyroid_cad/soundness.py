@@ -57,17 +57,17 @@ def require_sound(complex: CellComplex, grading: Grading) -> None:
     least, worst = np.inf, 0
     for some, laid in laid_patches(complex, grading, samples):
         shape = (-1, FOLD_SAMPLES, FOLD_SAMPLES, 3)
-        middle = laid.points.reshape(shape)
-        half = (laid.normals * (laid.thickness / 2)[:, np.newaxis]).reshape(shape)
-        along_u, along_v = (
-            [np.einsum(product, rate, a) for a in (middle, half)] for product in ("ab,pbvc->pavc", "ab,pubc->puac")
-        )
-        factor = _fold_factor(half, *along_u, *along_v)
+        middle, normal = laid.points.reshape(shape), laid.normals.reshape(shape)
+        reach = (laid.thickness / 2).reshape(shape[:3])[..., np.newaxis]
+        middle_u, normal_u = (np.einsum("ab,pbvc->pavc", rate, a) for a in (middle, normal))
+        middle_v, normal_v = (np.einsum("ab,pubc->puac", rate, a) for a in (middle, normal))
+        # How the thickness itself changes moves the faces along the normal only: it has no part in this.
+        factor = _fold_factor(normal, middle_u, reach * normal_u, middle_v, reach * normal_v)
         place = int(np.argmin(factor))
         if factor.ravel()[place] < least:
             least, worst = float(factor.ravel()[place]), place + some.start * FOLD_SAMPLES**2
         middles.append(middle[:, ::2, ::2].reshape(-1, 3))
-        halves.append(half[:, ::2, ::2].reshape(-1, 3))
+        halves.append((reach * normal)[:, ::2, ::2].reshape(-1, 3))
     if not least > 1:
         raise _too_thick(complex, grading, samples, worst, least, "where the wall folds over its own curvature")
     _require_clear(complex, grading, samples[::2], np.concatenate(middles), np.concatenate(halves))
@@ -128,11 +128,11 @@ def _require_clear(complex: CellComplex, grading: Grading, samples: Floats, midd
         raise _too_thick(complex, grading, samples, worst, least, "where the wall meets the one opposite")
 
 
-def _fold_factor(half: Floats, middle_u: Floats, half_u: Floats, middle_v: Floats, half_v: Floats) -> Floats:
-    """Smallest |s| at which the area vector (M_u + s H_u) x (M_v + s H_v) has no part along H; inf if none has."""
-    constant = _dot(np.cross(middle_u, middle_v), half)
-    linear = _dot(np.cross(middle_u, half_v) + np.cross(half_u, middle_v), half)
-    square = _dot(np.cross(half_u, half_v), half)
+def _fold_factor(through: Floats, middle_u: Floats, half_u: Floats, middle_v: Floats, half_v: Floats) -> Floats:
+    """Smallest |s| at which the area vector (M_u + s H_u) x (M_v + s H_v) has no part through the wall; inf if none."""
+    constant = _dot(np.cross(middle_u, middle_v), through)
+    linear = _dot(np.cross(middle_u, half_v) + np.cross(half_u, middle_v), through)
+    square = _dot(np.cross(half_u, half_v), through)
     discriminant = linear * linear - 4 * constant * square
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2 * np.abs(constant) / (np.abs(linear) + np.sqrt(discriminant))

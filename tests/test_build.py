@@ -14,9 +14,11 @@ from OCP.TopoDS import TopoDS_Shape
 import gyroid_cad.kernel.check
 import gyroid_cad.kernel.solid
 from gyroid_cad import build as build_module
-from gyroid_cad.build import FORMATS, Build, build, require_formats, require_settings
+from gyroid_cad.build import FORMATS, Build, Progress, Recipe, require_formats, require_settings
 from gyroid_cad.errors import FitError, KernelError, ParameterError
+from gyroid_cad.fields import Field, linear
 from gyroid_cad.fit import FitSettings
+from gyroid_cad.grading import Grading
 from gyroid_cad.kernel.check import Topology, enclosed_volume, topology
 from gyroid_cad.wall import Wall
 
@@ -25,6 +27,16 @@ Realise = Callable[..., TopoDS_Shape]
 CELLS = (1, 1, 1)
 COARSE = FitSettings(4)
 MEMORY = SimpleNamespace(available=1_000_000_000)
+
+
+def build(
+    cells: tuple[int, int, int],
+    cell_size: float,
+    thickness: float | Field,
+    settings: FitSettings,
+    progress: Progress | None = None,
+) -> Build:
+    return build_module.build(Recipe(cells, Grading(cell_size, thickness), settings, 1e-2), progress)
 
 
 @pytest.fixture
@@ -46,13 +58,31 @@ def targets(folder: Path, *names: str) -> list[Path]:
 def test_every_stage_is_told_from_nought_to_done_and_timed() -> None:
     told: dict[str, list[tuple[int, int]]] = {}
     made = build(CELLS, 10.0, 0.8, COARSE, lambda stage, done, total: told.setdefault(stage, []).append((done, total)))
-    assert list(told) == ["fit", "complex", "wall", "kernel", "solid", "check"]
+    assert list(told) == ["complex", "fit", "wall", "kernel", "solid", "check"]
     for steps in told.values():
         assert steps[0] == (0, 1)
         assert steps[-1] == (1, 1)
         assert all(0 <= done <= total for done, total in steps)
     assert list(made.seconds) == list(told)
     assert all(seconds >= 0 for seconds in made.seconds.values())
+
+
+@pytest.mark.usefixtures("forgotten")
+def test_a_wall_that_varies_is_checked_before_it_is_fitted_and_measured_after() -> None:
+    made = build(CELLS, 10.0, linear(0.6, x=0.02), COARSE)
+    assert list(made.seconds) == ["complex", "soundness", "deviation", "fit", "kernel", "solid", "check"]
+    assert made.refit is not None
+    assert made.refit.control_points == len(made.wall.weights)
+    assert made.samples_per_patch["deviation"] == made.refit.samples**2
+    assert made.thinnest == made.refit.thinnest < made.refit.thickest
+
+
+@pytest.mark.usefixtures("forgotten")
+def test_the_control_points_a_varying_wall_takes_are_asked_of_memory_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(build_module, "_require_memory", lambda cells, size, n=10: asked.append(n))
+    made = build_module.build(Recipe(CELLS, Grading(10.0, linear(0.6, x=0.02)), COARSE, 1e-4))
+    assert asked[0] == 4 < asked[-1] == len(made.wall.weights)
 
 
 @pytest.mark.usefixtures("forgotten")

@@ -27,8 +27,9 @@ from gyroid_cad.lattice import Lattice
 Captured = pytest.CaptureFixture[str]
 
 KEYS = [
-    *("cells", "cell_size", "thickness", "density", "patches", "faces", "solids", "valid", "closed"),
-    *("free_edges", "pinch_lines", "volume", "volume_exact", "max_deviation", "max_normal_angle", "seconds", "files"),
+    *("cells", "cell_size", "thickness", "thinnest", "thickest", "density", "patches", "faces", "solids"),
+    *("control_points", "valid", "closed", "free_edges", "pinch_lines", "volume", "volume_exact"),
+    *("max_deviation", "max_wall_error", "max_normal_angle", "samples_per_patch", "seconds", "files"),
 ]
 ONE_CELL = ["--cells", "1", "1", "1", "--cell-size", "10"]
 WALL = ["--thickness", "0.8"]

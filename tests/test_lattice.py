@@ -33,6 +33,7 @@ densities = st.floats(1e-3, 0.94)
 sizes = st.floats(1.0, 1e3)
 
 NUMBER_WORDS = "a finite number"
+FIELD_WORDS = "a number, an expression of x, y, z, a Field or a function"
 CELL_WORDS = "three whole numbers, each from 1 to 1000000"
 WALL_WORDS = "and below 3.7647 mm"
 DENSITY_WORDS = f"above 0 and below {LARGEST_DENSITY:.5f}"
@@ -44,7 +45,12 @@ BAD_CELLS = [0, -1, 1.5, True, "2", None, nan]
     [
         *(("cell_size", value, NUMBER_WORDS) for value in (nan, inf, -inf, "10", None, True, 1j, [10])),
         *(("cell_size", value, "0.01 to 100000 mm") for value in (0.0, -10.0, 1e-3, 1e6)),
-        *(("thickness", value, NUMBER_WORDS) for value in (nan, inf, "0.8", True)),
+        *(("thickness", value, NUMBER_WORDS) for value in (nan, inf)),
+        *(("thickness", value, FIELD_WORDS) for value in (True, [0.8], 1j)),
+        *(("tolerance", value, NUMBER_WORDS) for value in (nan, inf, "1e-4", True)),
+        *(("tolerance", value, "above 0 and below 1") for value in (0.0, -1e-4, 1.0)),
+        *(("map", value, "cylinder") for value in (30, ["twist"], "cone:radius=3")),
+        *(("scale_field", value, FIELD_WORDS) for value in (True, (1, 2))),
         *(
             ("thickness", value, WALL_WORDS)
             for value in (0.0, -0.8, 1e-5, THICKNESS_LIMIT * 10, LARGEST_THICKNESS * 10, 3.765, 10.0)
@@ -69,7 +75,8 @@ def test_a_bad_value_is_refused_in_one_line_with_its_name_and_what_is_accepted(
 @pytest.mark.parametrize(
     ("density", "accepted"),
     [
-        *((value, NUMBER_WORDS) for value in (nan, inf, "0.2", False)),
+        *((value, NUMBER_WORDS) for value in (nan, inf)),
+        *((value, FIELD_WORDS) for value in (False, {0.2})),
         *((value, DENSITY_WORDS) for value in (0.0, -0.2, LARGEST_DENSITY, 0.941, 1.0, 24.5)),
         (1e-9, "at least 3.09e-05"),
     ],

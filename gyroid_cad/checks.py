@@ -1,0 +1,55 @@
+"""Numbers that a user gives: real, finite, and no boolean."""
+
+from __future__ import annotations
+
+from math import inf, isfinite, nan
+from numbers import Real
+
+from gyroid_cad.errors import ParameterError
+
+__all__ = ["finite_number", "positive_number"]
+
+
+def finite_number(parameter: str, value: object, accepted: str = "a finite number") -> float:
+    """A real, finite number as a float.
+
+    Parameters
+    ----------
+    parameter : str
+        Its name, for errors.
+    value : object
+    accepted : str
+        What would be accepted, for errors.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else nan
+    except OverflowError:
+        number = inf
+    if not isfinite(number):
+        raise ParameterError(parameter, value, accepted)
+    return number
+
+
+def positive_number(parameter: str, value: object, accepted: str = "a finite number above 0") -> float:
+    """A real, finite number above 0 as a float.
+
+    Parameters
+    ----------
+    parameter : str
+        Its name, for errors.
+    value : object
+    accepted : str
+        What would be accepted, for errors.
+
+    Raises
+    ------
+    ParameterError
+    """
+    number = finite_number(parameter, value, accepted)
+    if number <= 0:
+        raise ParameterError(parameter, value, accepted)
+    return number

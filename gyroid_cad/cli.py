@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.tables import print_summary, print_table
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 PROGRAM = "gyroid-cad"
-# Columns of a pipe, which has none.
-_UNWRAPPED = 100_000
 DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 _CONFIG_ENDING = ".toml"
@@ -144,7 +143,7 @@ def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        _print_summary(summary)
+        print_summary(summary)
 
 
 _LATTICE_KEYS = frozenset(p.name for p in build.params if p.name) - {"config", "print_config", "as_json", "quiet"}
@@ -201,7 +200,7 @@ def fit_report_command(control_points: int, as_json: bool) -> None:
         "corner_error": "corners off by / L",
     }
     rows = [(label, *(f"{report[key]:.2e}" for report in reports.values())) for key, label in labels.items()]
-    _print_table(("L is the cell size", f"ours ({control_points} x {control_points})", "the paper's (10 x 10)"), rows)
+    print_table(("L is the cell size", f"ours ({control_points} x {control_points})", "the paper's (10 x 10)"), rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -281,53 +280,3 @@ def _summary(report: LatticeReport, outputs: Sequence[str], total: float) -> dic
     summary["seconds"] = {stage: round(value, 4) for stage, value in {**report.seconds, "total": total}.items()}
     summary["files"] = [{"path": path, "bytes": Path(path).stat().st_size} for path in outputs]
     return summary
-
-
-def _print_summary(summary: dict[str, Any]) -> None:
-    nx, ny, nz = summary["cells"]
-    error = summary["volume"] / summary["volume_exact"] - 1
-    rows = [
-        ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
-        ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
-        ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
-        ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
-        ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
-        ("deviation", _deviation(summary)),
-        *(([("checked", _checks(summary["samples_per_patch"]))]) if summary["samples_per_patch"] else []),
-        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
-        ("time", f"{summary['seconds']['total']:.2f} s"),
-    ]
-    _print_table(None, rows)
-
-
-def _range(summary: dict[str, Any]) -> str:
-    if summary["thinnest"] == summary["thickest"]:
-        return f"{summary['thickness']:.6g}"
-    return f"{summary['thinnest']:.4g} to {summary['thickest']:.4g}, on average {summary['thickness']:.4g}"
-
-
-def _deviation(summary: dict[str, Any]) -> str:
-    n = summary["control_points"]
-    shown = f"{summary['max_deviation']:.1e} mm, {summary['max_normal_angle']:.3f} degrees"
-    if summary["max_wall_error"] is not None:
-        shown += f", wall {summary['max_wall_error']:.1e} of itself"
-    return f"{shown}; {n} x {n} control points a patch"
-
-
-def _checks(samples: dict[str, int]) -> str:
-    return (
-        f"at {samples['deviation']} places a patch for deviation, {samples['fold']} for folding, "
-        f"{samples['clearance']} for walls that meet"
-    )
-
-
-def _print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(*(header or ("", "")), show_header=header is not None, box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
-    # In a pipe there is no width to respect: nothing is wrapped.
-    console = Console(highlight=False, markup=False, **({} if sys.stdout.isatty() else {"width": _UNWRAPPED}))  # type: ignore[arg-type]
-    console.print(table)

@@ -23,6 +23,9 @@ Size = tuple[float, float, float]
 MapFunction = Callable[[Floats, Floats, Floats], Sequence[ArrayLike]]
 JacobianFunction = Callable[[Floats, Floats, Floats], Sequence[Sequence[ArrayLike]]]
 
+# At how many points a Jacobian is compared with differences, and how closely: a wrong one is wrong by far more.
+_COMPARED_POINTS = 8
+_JACOBIAN_AGREEMENT = 1e-3
 OPEN = (False, False, False)
 
 
@@ -105,7 +108,12 @@ def carried(parameter: str, space: SpaceMap, points: Floats, step: float) -> tup
     moved = images(points)
     if space.jacobian is None:
         return moved, differences(images, points, step)
-    return moved, _components(parameter, space, _asked(parameter, space, space.jacobian, points), points, (3, 3))
+    jacobian = _components(parameter, space, _asked(parameter, space, space.jacobian, points), points, (3, 3))
+    few = slice(None, None, max(1, points.shape[1] // _COMPARED_POINTS))
+    measured = differences(images, points[:, few], step)
+    if not np.abs(jacobian[..., few] - measured).max() <= _JACOBIAN_AGREEMENT * np.abs(measured).max():
+        raise ParameterError(parameter, str(space), "a Jacobian that agrees with differences of the map itself")
+    return moved, jacobian
 
 
 def differences(function: Callable[[Floats], Floats], points: Floats, step: float) -> Floats:

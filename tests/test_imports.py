@@ -50,7 +50,7 @@ ROWS = [
     ["paper", "limits", "report"],
     ["lattice"],
     ["__init__"],
-    ["cq_plugin", "bd_objects", "progress", "config"],
+    ["cq_plugin", "bd_objects", "progress", "config", "tables"],
     ["cli"],
     ["__main__"],
 ]

@@ -1,0 +1,70 @@
+"""Tables on standard output: what was built, and how exactly."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = ["print_summary", "print_table"]
+
+# Columns of a pipe, which has none.
+_UNWRAPPED = 100_000
+
+
+def print_summary(summary: dict[str, Any]) -> None:
+    """Print a lattice's report, its files and the time it took.
+
+    Parameters
+    ----------
+    summary : dict
+        The report's values, with ``files`` and ``seconds["total"]``.
+    """
+    nx, ny, nz = summary["cells"]
+    error = summary["volume"] / summary["volume_exact"] - 1
+    rows = [
+        ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
+        ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
+        ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
+        ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
+        ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
+        ("deviation", _deviation(summary)),
+        *([("checked", _checks(summary["samples_per_patch"]))] if summary["samples_per_patch"] else []),
+        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
+        ("time", f"{summary['seconds']['total']:.2f} s"),
+    ]
+    print_table(None, rows)
+
+
+def _range(summary: dict[str, Any]) -> str:
+    if summary["thinnest"] == summary["thickest"]:
+        return f"{summary['thickness']:.6g}"
+    return f"{summary['thinnest']:.4g} to {summary['thickest']:.4g}, on average {summary['thickness']:.4g}"
+
+
+def _deviation(summary: dict[str, Any]) -> str:
+    n = summary["control_points"]
+    shown = f"{summary['max_deviation']:.1e} mm, {summary['max_normal_angle']:.3f} degrees"
+    if summary["max_wall_error"] is not None:
+        shown += f", wall {summary['max_wall_error']:.1e} of itself"
+    return f"{shown}; {n} x {n} control points a patch"
+
+
+def _checks(samples: dict[str, int]) -> str:
+    return (
+        f"at {samples['deviation']} places a patch for deviation, {samples['fold']} for folding, "
+        f"{samples['clearance']} for walls that meet"
+    )
+
+
+def print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]) -> None:
+    """Print rows of text in columns, under a header if there is one."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*(header or ("", "")), show_header=header is not None, box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    # In a pipe there is no width to respect: nothing is wrapped.
+    console = Console(highlight=False, markup=False, **({} if sys.stdout.isatty() else {"width": _UNWRAPPED}))  # type: ignore[arg-type]
+    console.print(table)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from benchmarks import (
     accuracy,
+    grading,
     memory,
     parameterisation,
     solid_against_sewing,
@@ -27,6 +28,7 @@ def main(arguments: Sequence[str] = ()) -> bool:
     cells = "5" if parser.parse_args(arguments).quick else "10"
     results = [
         accuracy.main(),
+        grading.main(),
         parameterisation.main(),
         startup.main(),
         solid_against_thickening.main(),

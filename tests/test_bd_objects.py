@@ -11,6 +11,7 @@ import pytest
 
 from gyroid_cad.bd_objects import Gyroid
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.field_makers import linear
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
 
@@ -172,3 +173,18 @@ def test_a_bad_value_is_a_value_error_and_leaves_the_builder_as_it_was(bad: dict
 def test_it_belongs_to_a_part_and_to_no_sketch() -> None:
     with bd.BuildSketch(), pytest.raises(RuntimeError):
         Gyroid(**GYROID)
+
+
+def test_fields_and_maps_are_those_of_a_lattice() -> None:
+    varying: dict[str, Any] = {
+        "density": linear(0.2, z=0.01),
+        "scale_field": "1 + 0.01*y",
+        "map": "bend:angle=30",
+        "tolerance": 1e-2,
+    }
+    part = Gyroid((1, 1, 1), 10.0, fit=FitSettings(6), align=None, **varying)
+    lattice = Lattice((1, 1, 1), 10.0, fit=FitSettings(6), **varying)
+    assert part.is_valid
+    assert len(part.solids()) == 1
+    assert part.volume == pytest.approx(lattice.exact_volume, rel=2e-3)
+    np.testing.assert_allclose(box_of(part), lattice.bounding_box(), atol=1e-6)

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 import gyroid_cad.cq_plugin
+from gyroid_cad.block_maps import Twist
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.field_makers import linear
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
 
@@ -191,3 +193,18 @@ def test_importing_the_plugin_changes_one_attribute_of_one_class(installation: d
 def test_a_name_already_taken_is_not_replaced_but_complained_of(installation: dict[str, Any]) -> None:
     assert installation["kept"]
     assert "cadquery.Workplane.gyroid is taken by __main__" in installation["refusal"]
+
+
+def test_fields_and_maps_are_those_of_a_lattice() -> None:
+    varying: dict[str, Any] = {
+        "thickness": linear(0.6, x=0.02),
+        "scale_field": "1 + 0.01*y",
+        "map": Twist(20),
+        "tolerance": 1e-2,
+    }
+    lattice = Lattice((1, 1, 1), 10.0, fit=FitSettings(6), **varying)
+    shape = cq.Workplane().gyroid((1, 1, 1), 10.0, fit=FitSettings(6), centered=False, **varying).val()
+    assert shape.isValid()
+    assert shape.ShapeType() == "Solid"
+    assert shape.Volume() == pytest.approx(lattice.exact_volume, rel=2e-3)
+    np.testing.assert_allclose(np.ptp(box_of(shape), axis=0), np.ptp(lattice.bounding_box(), axis=0), atol=1e-6)

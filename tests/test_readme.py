@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -42,7 +43,7 @@ def test_each_python_block_runs(block: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("command", [c for c in commands() if c.startswith("gyroid-cad")])
 def test_each_shell_command_runs(command: str, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", *command.replace("gyroid-cad", "gyroid_cad", 1).split()],
+        [sys.executable, "-m", *shlex.split(command.replace("gyroid-cad", "gyroid_cad", 1))],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -39,6 +39,7 @@ RESULTS = (
     Result("unit_cell_density_0.30_ap242.step", Lattice((1, 1, 1), 10, density=0.3), "ap242"),
     Result("unit_cell_rational.brep", Lattice((1, 1, 1), 10, thickness=0.8, fit=rational_fit())),
     Result("two_cells_cubed.brep", Lattice((2, 2, 2), 10, thickness=0.8)),
+    Result("unit_cell_graded.step", Lattice((1, 1, 1), 10, "0.6 + 0.03*x", scale_field="1 + 0.02*y"), "ap242"),
     Result("unit_cell.stl", Lattice((1, 1, 1), 10, thickness=0.8), deviation=0.1),
 )
 

@@ -16,7 +16,8 @@ import gyroid_cad.kernel.solid
 from gyroid_cad import build as build_module
 from gyroid_cad.build import FORMATS, Build, Progress, Recipe, require_formats, require_settings
 from gyroid_cad.errors import FitError, KernelError, ParameterError
-from gyroid_cad.fields import Field, linear
+from gyroid_cad.field_makers import linear
+from gyroid_cad.fields import Field
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.grading import Grading
 from gyroid_cad.kernel.check import Topology, enclosed_volume, topology

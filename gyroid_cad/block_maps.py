@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from math import pi, radians
 from types import MappingProxyType
 from typing import Any
@@ -15,7 +16,7 @@ from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.maps import BlockMap, Size, SpaceMap
 
-__all__ = ["MAPS", "Bend", "Cylinder", "Sphere", "Twist", "as_map", "parse_map"]
+__all__ = ["MAPS", "Bend", "Cylinder", "Sphere", "Twist", "as_map", "parse_map", "space_over"]
 
 Floats = NDArray[np.float64]
 
@@ -188,8 +189,10 @@ class Bend:
         radius = size[0] / radians(self.angle)
 
         def function(x: Floats, y: Floats, z: Floats) -> Sequence[ArrayLike]:
-            turned, reach = (x - middle) / radius, radius - (z - level)
-            return middle + reach * np.sin(turned), y, level + radius - reach * np.cos(turned)
+            turned, height = (x - middle) / radius, z - level
+            # radius (1 - cos) without the cancellation of a large radius.
+            rise = 2 * radius * np.sin(turned / 2) ** 2
+            return middle + (radius - height) * np.sin(turned), y, level + rise + height * np.cos(turned)
 
         def jacobian(x: Floats, y: Floats, z: Floats) -> Sequence[Sequence[ArrayLike]]:
             turned, stretch = (x - middle) / radius, 1 - (z - level) / radius
@@ -243,14 +246,38 @@ def as_map(value: object) -> BlockMap:
     ------
     ParameterError
     """
-    if isinstance(value, BlockMap):
+    if isinstance(value, BlockMap) and not isinstance(value, type):
         return value
     if isinstance(value, str):
         return parse_map(value)
-    if callable(value):
-        # Maps are remembered by what they are made of, so of one that can't be its bound method is.
-        return SpaceMap(value if isinstance(value, Hashable) else value.__call__)
+    if callable(value) and not isinstance(value, type):
+        return SpaceMap(value)
     raise ParameterError("map", value, f"a SpaceMap, {', '.join(MAPS)}, or a function of x, y, z")
+
+
+def space_over(block_map: BlockMap, cells: tuple[int, int, int], cell_size: float) -> SpaceMap:
+    """The map for a block of cells; of equal maps and blocks the same object, so that equal lattices are built once.
+
+    Raises
+    ------
+    ParameterError
+        If it does not suit the block.
+    """
+    x, y, z = (n * cell_size for n in cells)
+    try:
+        hash(block_map)
+    except TypeError:
+        space = block_map.over((x, y, z))
+    else:
+        space = _remembered(block_map, (x, y, z))  # type: ignore[arg-type]
+    if not isinstance(space, SpaceMap):
+        raise ParameterError("map", block_map, f"a map whose `over` gives a SpaceMap, not {type(space).__name__}")
+    return space
+
+
+@lru_cache(maxsize=16)
+def _remembered(block_map: BlockMap, size: Size) -> SpaceMap:
+    return block_map.over(size)
 
 
 def _parameters(kind: Callable[..., BlockMap]) -> list[str]:

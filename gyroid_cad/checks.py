@@ -1,13 +1,14 @@
-"""Numbers that a user gives: real, finite, and no boolean."""
+"""What a user gives: numbers that are real, finite and no boolean, functions that can be remembered."""
 
 from __future__ import annotations
 
 from math import inf, isfinite, nan
 from numbers import Real
+from typing import Any
 
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["finite_number", "positive_number"]
+__all__ = ["finite_number", "hashable", "positive_number"]
 
 
 def finite_number(parameter: str, value: object, accepted: str = "a finite number") -> float:
@@ -53,3 +54,12 @@ def positive_number(parameter: str, value: object, accepted: str = "a finite num
     if number <= 0:
         raise ParameterError(parameter, value, accepted)
     return number
+
+
+def hashable(function: Any) -> Any:
+    """The function, or its bound call if it cannot be hashed: builds are remembered by what they are made of."""
+    try:
+        hash(function)
+    except TypeError:
+        return function.__call__
+    return function

@@ -8,6 +8,7 @@ has vertices of its own, so that the wall's surface stays a two-manifold.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,6 +111,8 @@ def build_complex(
     cells: tuple[int, int, int],
     placements: Placements | None = None,
     closed: tuple[bool, bool, bool] = (False, False, False),
+    first: tuple[int, int, int] = (0, 0, 0),
+    wanted: Callable[[Integers, Integers], Booleans] | None = None,
 ) -> CellComplex:
     """Number the patches, edges, corners and fans of a block of cubic cells.
 
@@ -122,6 +125,10 @@ def build_complex(
     closed : tuple of bool
         Along which axes the last cells join the first ones, as round a cylinder: a corner at the far end is the
         same as that at the near end.
+    first : tuple of int
+        The cell with the lowest indices.
+    wanted : callable, optional
+        Which patches to keep, from their placements (patches,) and cells (patches, 3); all if left out.
 
     Returns
     -------
@@ -130,7 +137,10 @@ def build_complex(
     placements = cubic_cell() if placements is None else placements
     grid = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
     patch_placement = np.tile(np.arange(len(placements)), len(grid))
-    patch_cell = np.repeat(grid, len(placements), axis=0)
+    patch_cell = np.repeat(grid + np.array(first), len(placements), axis=0)
+    if wanted is not None:
+        kept = wanted(patch_placement, patch_cell)
+        patch_placement, patch_cell = patch_placement[kept], patch_cell[kept]
     quarters = placed_corners(placements)[patch_placement] + CELL_QUARTERS * patch_cell[:, np.newaxis]
 
     for axis in np.flatnonzero(closed):

@@ -14,7 +14,15 @@ from gyroid_cad.grading import Grading, Laid
 from gyroid_cad.patch import PARAMETERISATIONS
 from gyroid_cad.symmetry import QUARTER
 
-__all__ = ["ExactMeasures", "block_volume", "differentiation_matrix", "exact_measures", "laid_patches", "sampled_place"]
+__all__ = [
+    "ExactMeasures",
+    "block_volume",
+    "differentiation_matrix",
+    "exact_measures",
+    "interpolation_matrix",
+    "laid_patches",
+    "sampled_place",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -179,3 +187,21 @@ def differentiation_matrix(nodes: Floats) -> Floats:
     np.fill_diagonal(matrix, 0.0)
     np.fill_diagonal(matrix, -matrix.sum(axis=1))
     return np.asarray(matrix)
+
+
+def interpolation_matrix(nodes: Floats, places: Floats) -> Floats:
+    """Values at other places of the polynomial through values at the nodes (Lagrange's form).
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (m,)
+    places : ndarray, shape (k,)
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+    """
+    others = ~np.eye(len(nodes), dtype=bool)
+    denominators = np.prod(nodes[:, np.newaxis] - nodes, axis=1, where=others)
+    products = [np.prod(places[:, np.newaxis] - nodes[others[j]], axis=1) for j in range(len(nodes))]
+    return np.asarray(np.stack(products, axis=1) / denominators)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf, isfinite
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyroid_cad.checks import finite_number
+from gyroid_cad.checks import finite_number, hashable
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.expressions import Expression, compile_expression
 
-__all__ = ["Field", "Floats", "as_field", "call_text", "compiled_field", "derived", "evaluated", "shown"]
+__all__ = ["Field", "Floats", "as_field", "call_text", "compiled_field", "derived", "evaluated", "given_as", "shown"]
 
 Floats = NDArray[np.float64]
 Function = Callable[[Floats, Floats, Floats], ArrayLike]
@@ -45,11 +45,14 @@ class Field:
         How the field prints, as one term.
     value : float, optional
         Of a field that is the same everywhere.
+    parameter : str, optional
+        What a user gave it as, where that is not what it is used for.
     """
 
     function: Function
     text: str
     value: float | None = None
+    parameter: str | None = None
 
     # A NumPy number on the left leaves the operation to the field.
     __array_ufunc__ = None
@@ -130,9 +133,12 @@ def as_field(parameter: str, value: object, meaning: str) -> float | Field:
             parameter, value, f"{meaning}: a number, an expression of x, y, z, a Field or a function of them"
         )
     name = getattr(value, "__name__", None)
-    # Fields are remembered by what they are made of, so of one that can't be its bound method is.
-    function = value if isinstance(value, Hashable) else value.__call__
-    return Field(function, " ".join((name if isinstance(name, str) else repr(value)).split()))
+    return Field(hashable(value), " ".join((name if isinstance(name, str) else repr(value)).split()))
+
+
+def given_as(parameter: str, value: float | Field | None) -> str:
+    """What a user knows a parameter's field as, for errors."""
+    return value.parameter if isinstance(value, Field) and value.parameter else parameter
 
 
 def evaluated(parameter: str, field: Field, points: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import SoundnessError
-from gyroid_cad.fields import Field, evaluated
+from gyroid_cad.fields import Field, evaluated, given_as
 from gyroid_cad.maps import SpaceMap, carried, differences
 from gyroid_cad.tube import LARGEST_DENSITY, thickness_of_density
 
@@ -133,7 +133,8 @@ class Grading:
         determinant: Floats | float = 1.0
         if self.scale_field is not None:
             images, jacobian = self._scaled(images)
-            determinant = _positive_determinant("scale_field", jacobian, points)
+            name = given_as("scale_field", self.scale_field)
+            determinant = _positive_determinant(name, jacobian, points)
         if self.map is not None:
             images, onward = carried("map", self.map, images, _STEP * self.cell_size)
             determinant = determinant * _positive_determinant("map", onward, points)
@@ -143,11 +144,13 @@ class Grading:
     def _scaled(self, places: Floats) -> tuple[Floats, Floats]:
         """p -> s(p) p, whose Jacobian is s I + p (grad s)^T."""
 
+        name = given_as("scale_field", self.scale_field)
+
         def scale(points: Floats) -> Floats:
-            return _values("scale_field", self.scale_field, points.T)
+            return _values(name, self.scale_field, points.T)
 
         factor, slope = scale(places), differences(scale, places, _STEP * self.cell_size)
-        _require("scale_field", factor, places.T, 0.0, "above", "everywhere in the lattice")
+        _require(name, factor, places.T, 0.0, "above", "everywhere in the lattice")
         jacobian = places[:, np.newaxis] * slope
         for axis in range(3):
             jacobian[axis, axis] += factor
@@ -162,8 +165,9 @@ class Grading:
         SoundnessError
             If it is not positive everywhere, or a density past the largest.
         """
-        parameter = "thickness" if self.thickness is not None else "density"
-        values = _values(parameter, self.thickness if self.density is None else self.density, points)
+        value = self.thickness if self.density is None else self.density
+        parameter = given_as("thickness" if self.density is None else "density", value)
+        values = _values(parameter, value, points)
         if self.density is None:
             _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall")
             return values

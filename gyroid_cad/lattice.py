@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
-from gyroid_cad.block_maps import as_map
+from gyroid_cad.block_maps import as_map, space_over
 from gyroid_cad.build import Build, Progress, Recipe, build, require_formats, require_settings
 from gyroid_cad.checks import finite_number
 from gyroid_cad.complex import build_complex
@@ -21,7 +21,7 @@ from gyroid_cad.fields import Field, as_field
 from gyroid_cad.fit import FitSettings, fit_within
 from gyroid_cad.grading import Grading
 from gyroid_cad.limits import require_cell_size, require_density, require_thickness, whole_cells
-from gyroid_cad.maps import BlockMap, SpaceMap
+from gyroid_cad.maps import BlockMap
 from gyroid_cad.paper import paper_units
 from gyroid_cad.report import LatticeReport, report_of
 from gyroid_cad.tube import density_of_thickness, thickness_of_density
@@ -281,8 +281,7 @@ class Lattice:
     def _grading(self) -> Grading:
         if self.uniform:
             return Grading(self.cell_size, self.wall_thickness)
-        x, y, z = (n * self.cell_size for n in self.cells)
-        space = None if self.map is None else _over(self.map, (x, y, z))  # type: ignore[arg-type]
+        space = None if self.map is None else space_over(self.map, self.cells, self.cell_size)  # type: ignore[arg-type]
         return Grading(self.cell_size, self.thickness, self.density, self.scale_field, space)  # type: ignore[arg-type]
 
     def _measures(self) -> ExactMeasures:
@@ -303,12 +302,6 @@ class Lattice:
             object.__setattr__(self, "tolerance", finite_number("tolerance", self.tolerance, accepted))
             if not 0 < self.tolerance < 1:
                 raise ParameterError("tolerance", self.tolerance, accepted)
-
-
-@lru_cache(maxsize=16)
-def _over(block_map: BlockMap, size: Corner) -> SpaceMap:
-    """The same object each time, so that equal lattices are built once."""
-    return block_map.over(size)
 
 
 @lru_cache(maxsize=16)

@@ -14,6 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gyroid_cad.checks import hashable
 from gyroid_cad.errors import ParameterError
 
 __all__ = ["OPEN", "BlockMap", "JacobianFunction", "MapFunction", "Size", "SpaceMap", "carried", "differences"]
@@ -66,8 +67,11 @@ class SpaceMap:
             raise ParameterError("function", self.function, "a function of x, y, z that returns three arrays")
         if self.jacobian is not None and not callable(self.jacobian):
             raise ParameterError("jacobian", self.jacobian, "a function of x, y, z that returns 3 x 3 arrays, or None")
-        if len(self.closed) != 3 or not all(isinstance(closed, bool) for closed in self.closed):
+        if not isinstance(self.closed, tuple | list) or [type(end) for end in self.closed] != [bool] * 3:
             raise ParameterError("closed", self.closed, "three of True and False")
+        object.__setattr__(self, "function", hashable(self.function))
+        object.__setattr__(self, "jacobian", hashable(self.jacobian))
+        object.__setattr__(self, "closed", tuple(self.closed))
 
     def over(self, size: Size) -> SpaceMap:
         """The same map, whatever the block."""

@@ -80,11 +80,12 @@ def paper_units(
     if isinstance(length, float):
         unit, scale_field = positive_number("bc_length", length, "a length in BC units above 0") * scale, None
     else:
-        unit, scale_field = scale, _in_units(length, scale, 1.0)
-    wall = thickness * scale if isinstance(thickness, float) else _in_units(thickness, unit, scale)
+        unit, scale_field = scale, _in_units("bc_length", length, scale, 1.0)
+    wall = thickness * scale if isinstance(thickness, float) else _in_units("thickness_factor", thickness, unit, scale)
     return PaperUnits(_CELL * unit, wall, scale_field)
 
 
-def _in_units(field: Field, unit: float, factor: float) -> Field:
+def _in_units(parameter: str, field: Field, unit: float, factor: float) -> Field:
     text = f"({field})(x/{unit:g}, y/{unit:g}, z/{unit:g})"
-    return Field(_InUnits(field, unit, factor), text if factor == 1 else f"{factor:g}*{text}")
+    text = text if factor == 1 else f"{factor:g}*{text}"
+    return Field(_InUnits(field, unit, factor), text, parameter=parameter)

@@ -26,8 +26,8 @@ __all__ = ["Refit", "fitted_nets", "fitted_wall", "likely_control_points", "meas
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# As close as the tolerance asks, and the wall as true as this, relative to itself.
-WALL_TOLERANCE = 5e-4
+# The wall may be off by so many times the tolerance, relative to itself.
+WALL_PER_TOLERANCE = 5.0
 _CHECKS_PER_SPAN = 2
 _TRIED_PATCHES = 32
 _LARGEST_EXCESS_TRUSTED = 16.0
@@ -66,7 +66,7 @@ class Refit:
 
     def excess(self, tolerance: float, cell_size: float) -> float:
         """How many times as far off the fit is as it may be."""
-        return max(self.max_deviation / (tolerance * cell_size), self.max_wall_error / WALL_TOLERANCE)
+        return max(self.max_deviation / (tolerance * cell_size), self.max_wall_error / (WALL_PER_TOLERANCE * tolerance))
 
     def control_points_for(self, tolerance: float, cell_size: float) -> int:
         """How many control points to fit with next; as many as now if the fit is as close as asked for.
@@ -91,9 +91,9 @@ class Refit:
             raise ParameterError(
                 "tolerance",
                 tolerance,
-                f"what {MOST_CONTROL_POINTS} control points a side can reach: they are {reached:.2g} of the cell "
-                f"size off, and the wall {self.max_wall_error:.1e} of itself ({WALL_TOLERANCE:g} may be); "
-                "is a field or the map not smooth?",
+                f"at least {tolerance * excess:.2g}: {MOST_CONTROL_POINTS} control points a side are {reached:.2g} of "
+                f"the cell size off, and the wall {self.max_wall_error:.2g} of itself, which counts as a "
+                f"{WALL_PER_TOLERANCE:g}th; is a field or the map not smooth?",
             )
         return more_control_points(self.control_points, excess)
 

@@ -7,12 +7,16 @@ is evaluated.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.complex import CellComplex
 from gyroid_cad.errors import SoundnessError
-from gyroid_cad.exact_wall import differentiation_matrix, laid_patches, sampled_place
+from gyroid_cad.exact_wall import differentiation_matrix, interpolation_matrix, laid_patches, sampled_place
+from gyroid_cad.fields import given_as
 from gyroid_cad.grading import Grading
 from gyroid_cad.nurbs import grid_derivatives
 from gyroid_cad.tube import density_of_thickness, thickness_of_density
@@ -28,16 +32,34 @@ Booleans = NDArray[np.bool_]
 # patch, where it curves most, is among them; the second are every other one of the first.
 FOLD_SAMPLES = 17
 CLEARANCE_SAMPLES = 9
+# Patches this near to folding are looked at again, on a grid this fine.
+_NEAR_FOLDING, _FINE_SAMPLES = 1.25, 65
+# Parts of the half wall at which a wall that reaches past another is looked for.
+_ALONG_THE_WALL = np.arange(1, 8) / 8
+_COMPARED = 12
+_FOLDS = "where the wall folds over its own curvature"
+_MEETS = "where the wall meets the one opposite"
 _PATCHES_AT_ONCE = 64
+
+
+@dataclass(frozen=True, slots=True)
+class _Worst:
+    """Where the wall would have to be scaled most to pass, and by what."""
+
+    factor: float
+    patch: int
+    index: int
+    samples: Floats
+    reason: str
 
 
 def require_sound(complex: CellComplex, grading: Grading) -> None:
     """Refuse a wall thicker than its curvature lets it be, or that meets another across a pore or elsewhere.
 
     Laid off by s times its half thickness the mid-surface's area vector along the wall is a quadratic in s; the
-    face folds over where that reaches zero for an s from -1 to 1. This is checked at 17 x 17 places a patch. At 9 x 9
-    of them the points of both faces are looked up among those of all mid-surfaces: none may lie in the wall of a
-    patch it faces, or of one that is no neighbour.
+    face folds over where that reaches zero for an s from -1 to 1. This is checked at 17 x 17 places a patch, and at
+    65 x 65 of patches that come near it. At 9 x 9 of the places the points of both faces are looked up among
+    those of all mid-surfaces: none may lie in, or beyond, the wall of a patch it faces or of one that is no neighbour.
 
     Parameters
     ----------
@@ -51,26 +73,53 @@ def require_sound(complex: CellComplex, grading: Grading) -> None:
     SoundnessError
         Naming the place that is furthest from sound, what is there, and what would pass.
     """
-    samples = -np.cos(np.pi * np.arange(FOLD_SAMPLES) / (FOLD_SAMPLES - 1))
-    rate = differentiation_matrix(samples)
-    middles, halves = [], []
-    least, worst = np.inf, 0
-    for some, laid in laid_patches(complex, grading, samples):
-        shape = (-1, FOLD_SAMPLES, FOLD_SAMPLES, 3)
-        middle, normal = laid.points.reshape(shape), laid.normals.reshape(shape)
-        reach = (laid.thickness / 2).reshape(shape[:3])[..., np.newaxis]
-        middle_u, normal_u = (np.einsum("ab,pbvc->pavc", rate, a) for a in (middle, normal))
-        middle_v, normal_v = (np.einsum("ab,pubc->puac", rate, a) for a in (middle, normal))
-        # How the thickness itself changes moves the faces along the normal only: it has no part in this.
-        factor = _fold_factor(normal, middle_u, reach * normal_u, middle_v, reach * normal_v)
-        place = int(np.argmin(factor))
-        if factor.ravel()[place] < least:
-            least, worst = float(factor.ravel()[place]), place + some.start * FOLD_SAMPLES**2
+    nodes = -np.cos(np.pi * np.arange(FOLD_SAMPLES) / (FOLD_SAMPLES - 1))
+    middles, halves, found = [], [], []
+    for some, laid in laid_patches(complex, grading, nodes):
+        shape = (-1, FOLD_SAMPLES, FOLD_SAMPLES)
+        middle, normal = laid.points.reshape(*shape, 3), laid.normals.reshape(*shape, 3)
+        reach = (laid.thickness / 2).reshape(shape)[..., np.newaxis]
+        found.append(_nearest_to_folding(nodes, middle, normal, reach, some.start))
         middles.append(middle[:, ::2, ::2].reshape(-1, 3))
         halves.append((reach * normal)[:, ::2, ::2].reshape(-1, 3))
-    if not least > 1:
-        raise _too_thick(complex, grading, samples, worst, least, "where the wall folds over its own curvature")
-    _require_clear(complex, grading, samples[::2], np.concatenate(middles), np.concatenate(halves))
+    meeting = _meeting(complex, nodes[::2], np.concatenate(middles), np.concatenate(halves))
+    worst = min([*found, *meeting], key=lambda place: place.factor)
+    if not worst.factor > 1:
+        raise _too_thick(complex, grading, worst)
+
+
+def _nearest_to_folding(nodes: Floats, middle: Floats, normal: Floats, reach: Floats, first: int) -> _Worst:
+    """The place of some patches where the wall comes nearest to folding over."""
+    factor = _exact_fold_factor(nodes, nodes, middle, normal, reach).reshape(len(middle), -1)
+    patch = int(np.argmin(factor.min(axis=1)))
+    worst = _Worst(float(factor[patch].min()), first + patch, int(np.argmin(factor[patch])), nodes, _FOLDS)
+    near = np.flatnonzero(factor.min(axis=1) < _NEAR_FOLDING)
+    fine = np.linspace(-1, 1, _FINE_SAMPLES)
+    for patch in near.tolist():
+        # One patch at a time: they are few, and 65 x 65 places are many.
+        closer = _exact_fold_factor(nodes, fine, *(a[patch : patch + 1] for a in (middle, normal, reach))).ravel()
+        index = int(np.argmin(closer))
+        if closer[index] < worst.factor:
+            worst = _Worst(float(closer[index]), first + patch, index, fine, _FOLDS)
+    return worst
+
+
+def _exact_fold_factor(nodes: Floats, places: Floats, middle: Floats, normal: Floats, reach: Floats) -> Floats:
+    """Fold factors at a grid of places, from the polynomials through values at the nodes."""
+    values, rate = interpolation_matrix(nodes, places), differentiation_matrix(nodes)
+    slope = values @ rate
+
+    def at_places(along_u: Floats, along_v: Floats, samples: Floats) -> Floats:
+        count, components = len(samples), samples.shape[-1]
+        wide = along_u @ samples.reshape(count, len(nodes), -1)
+        return np.asarray(along_v @ wide.reshape(count, len(places), len(nodes), components))
+
+    # How the thickness itself changes moves the faces along the normal only: it has no part in this.
+    half = at_places(values, values, reach)
+    middle_u, normal_u = (at_places(slope, values, a) for a in (middle, normal))
+    middle_v, normal_v = (at_places(values, slope, a) for a in (middle, normal))
+    through = at_places(values, values, normal)
+    return _fold_factor(through, middle_u, half * normal_u, middle_v, half * normal_v)
 
 
 def require_sound_fit(wall: Wall, grading: Grading) -> None:
@@ -87,45 +136,98 @@ def require_sound_fit(wall: Wall, grading: Grading) -> None:
     SoundnessError
         As :func:`require_sound` does.
     """
-    samples = np.linspace(-1, 1, FOLD_SAMPLES)
-    knots = (wall.knots, wall.knots)
-    least, worst = np.inf, 0
+    coarse, fine = (np.linspace(-1, 1, count) for count in (FOLD_SAMPLES, _FINE_SAMPLES))
+    reason = f"where the fit with {len(wall.weights)} control points a side folds over"
+    worst = _Worst(np.inf, 0, 0, coarse, reason)
     for first in range(0, len(wall.nets), _PATCHES_AT_ONCE):
-        below, above = np.moveaxis(wall.nets[first : first + _PATCHES_AT_ONCE], 1, 0)
-        _, middle_u, middle_v = grid_derivatives((above + below) / 2, wall.weights, knots, samples, samples)
-        half, half_u, half_v = grid_derivatives((above - below) / 2, wall.weights, knots, samples, samples)
-        factor = _fold_factor(half, middle_u, half_u, middle_v, half_v)
-        place = int(np.argmin(factor))
-        if factor.ravel()[place] < least:
-            least, worst = float(factor.ravel()[place]), place + first * FOLD_SAMPLES**2
-    if not least > 1:
-        reason = f"where the fit with {len(wall.weights)} control points a side folds over"
-        raise _too_thick(wall.complex, grading, samples, worst, least, reason)
+        factor = _fitted_fold_factor(wall, slice(first, first + _PATCHES_AT_ONCE), coarse)
+        for patch in (first + np.flatnonzero(factor.min(axis=1) < _NEAR_FOLDING)).tolist():
+            closer = _fitted_fold_factor(wall, slice(patch, patch + 1), fine)[0]
+            if closer.min() < worst.factor:
+                worst = _Worst(float(closer.min()), patch, int(np.argmin(closer)), fine, reason)
+    if not worst.factor > 1:
+        raise _too_thick(wall.complex, grading, worst)
 
 
-def _require_clear(complex: CellComplex, grading: Grading, samples: Floats, middle: Floats, half: Floats) -> None:
+def _fitted_fold_factor(wall: Wall, some: slice, samples: Floats) -> Floats:
+    """Fold factors of some fitted patches at a grid of samples; shape (patches, samples * samples)."""
+    knots = (wall.knots, wall.knots)
+    below, above = np.moveaxis(wall.nets[some], 1, 0)
+    _, middle_u, middle_v = grid_derivatives((above + below) / 2, wall.weights, knots, samples, samples)
+    half, half_u, half_v = grid_derivatives((above - below) / 2, wall.weights, knots, samples, samples)
+    return _fold_factor(half, middle_u, half_u, middle_v, half_v).reshape(len(below), -1)
+
+
+def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats) -> list[_Worst]:
+    """Where walls meet others most, if they do."""
     from scipy.spatial import cKDTree
 
-    reach = np.linalg.norm(half, axis=1)
-    tree = cKDTree(middle)
     patch = np.repeat(np.arange(complex.patch_count), CLEARANCE_SAMPLES**2)
-    least, worst = 1.0, -1
+    reach = np.linalg.norm(half, axis=1)
+    lookup = _Lookup(cKDTree(middle), middle, half, reach, patch, complex.patch_corners)
+    everywhere = np.arange(len(middle))
+    found = [lookup.crossing(everywhere)]
     for side in (-1, 1):
-        tips = middle + side * half
-        distance, nearest = (np.asarray(found) for found in tree.query(tips))
-        inside = np.flatnonzero((distance < reach[nearest]) & (patch != patch[nearest]))
-        other = nearest[inside]
-        across = _dot(tips[inside] - middle[other], half[other])
-        facing = side * _dot(half[inside], half[other]) * across < 0
-        met = facing | ~_neighbours(complex.patch_corners, patch[inside], patch[other])
-        inside, other = inside[met], other[met]
-        if len(inside):
-            factor = _meeting_factor(middle[other] - middle[inside], side * half[inside], reach[other])
+        met, beyond = lookup.met(everywhere, side * half)
+        found.append(met)
+        found += [lookup.met(beyond, side * part * half[beyond])[0] for part in _ALONG_THE_WALL]
+    worst = []
+    for where, factor in found:
+        if len(where):
             place = int(np.argmin(factor))
-            if factor[place] < least:
-                least, worst = float(factor[place]), int(inside[place])
-    if worst >= 0:
-        raise _too_thick(complex, grading, samples, worst, least, "where the wall meets the one opposite")
+            at = divmod(int(where[place]), CLEARANCE_SAMPLES**2)
+            worst.append(_Worst(float(factor[place]), *at, samples, _MEETS))
+    return worst
+
+
+@dataclass(frozen=True, slots=True)
+class _Lookup:
+    """Samples of all mid-surfaces, to be found by place."""
+
+    tree: Any
+    middle: Floats
+    half: Floats
+    reach: Floats
+    patch: Integers
+    corners: Integers
+
+    def met(self, samples: Integers, offsets: Floats) -> tuple[tuple[Integers, Floats], Integers]:
+        """Which samples, moved by the offsets, lie in other walls, and what factor on both walls would part them.
+
+        Also those that only come nearer to another mid-surface than to their own: they may have passed its wall.
+        """
+        places = self.middle[samples] + offsets
+        distance, nearest = (np.asarray(found) for found in self.tree.query(places))
+        near = distance < np.maximum(self.reach[nearest], np.linalg.norm(offsets, axis=1))
+        candidates = np.flatnonzero(near & (self.patch[samples] != self.patch[nearest]))
+        first, second = samples[candidates], nearest[candidates]
+        across = _dot(places[candidates] - self.middle[second], self.half[second])
+        facing = _dot(offsets[candidates], self.half[second]) * across < 0
+        other = facing | ~self._neighbours(first, second)
+        inside = other & (distance[candidates] < self.reach[second])
+        apart = (self.middle[second] - self.middle[first])[inside]
+        side = np.sign(_dot(offsets[candidates], self.half[first]))[inside, np.newaxis]
+        factor = _meeting_factor(apart, side * self.half[first[inside]], self.reach[second[inside]])
+        return (first[inside], factor), first[other & ~inside]
+
+    def crossing(self, samples: Integers) -> tuple[Integers, Floats]:
+        """Which samples lie by a mid-surface that is no neighbour, nearer than both walls reach; and the same factor.
+
+        Walls thinner than the places looked at lie apart would else cross unseen.
+        """
+        nearest = np.asarray(self.tree.query(self.middle[samples], k=min(_COMPARED, len(self.middle)))[1])
+        first, second = np.repeat(samples, nearest.shape[1]), nearest.ravel()
+        strangers = ~self._neighbours(first, second)
+        first, second = first[strangers], second[strangers]
+        height = np.abs(_dot(self.middle[first] - self.middle[second], self.half[second])) / self.reach[second]
+        factor = height / (self.reach[first] + self.reach[second])
+        return first[factor < 1], factor[factor < 1]
+
+    def _neighbours(self, first: Integers, second: Integers) -> Booleans:
+        """Whether the patches of two samples share a corner."""
+        corners = (self.corners[self.patch[samples]] for samples in (first, second))
+        one, other = corners
+        return np.asarray((one[:, :, np.newaxis] == other[:, np.newaxis, :]).any(axis=(1, 2)))
 
 
 def _fold_factor(through: Floats, middle_u: Floats, half_u: Floats, middle_v: Floats, half_v: Floats) -> Floats:
@@ -141,33 +243,28 @@ def _fold_factor(through: Floats, middle_u: Floats, half_u: Floats, middle_v: Fl
 
 
 def _meeting_factor(apart: Floats, half: Floats, other_reach: Floats) -> Floats:
-    """By what both walls are to be scaled so that the tip of one just touches the other, 0 if they cross anyway.
+    """By what two walls are to be scaled so that they just touch: the least s for which one, up to s half, comes
+    within s other_reach of the other's place on its mid-surface.
 
-    Solves |apart - s half| = s other_reach.
+    That is where its tip does, |apart - s half| = s other_reach, unless the tip has passed the place before.
     """
-    squared, along = _dot(apart, apart), _dot(apart, half)
-    discriminant = along * along - (_dot(half, half) - other_reach**2) * squared
+    squared, along, own = _dot(apart, apart), _dot(apart, half), _dot(half, half)
+    foot = np.maximum(along / own, 0)
+    aside = np.sqrt(np.maximum(squared - foot**2 * own, 0))
+    discriminant = along * along - (own - other_reach**2) * squared
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = squared / (along + np.sqrt(np.maximum(discriminant, 0)))
-    return np.where((factor > 0) & (factor < 1), factor, 0.0)
+        by_tip = squared / (along + np.sqrt(np.maximum(discriminant, 0)))
+    return np.where(aside <= foot * other_reach, by_tip, aside / other_reach)
 
 
-def _neighbours(patch_corners: Integers, first: Integers, second: Integers) -> Booleans:
-    """Whether patches share a corner."""
-    shared = patch_corners[first][:, :, np.newaxis] == patch_corners[second][:, np.newaxis, :]
-    return np.asarray(shared.any(axis=(1, 2)))
-
-
-def _too_thick(
-    complex: CellComplex, grading: Grading, samples: Floats, worst: int, factor: float, reason: str
-) -> SoundnessError:
-    """The error for a sample, by its index among all, that would pass at ``factor`` of its thickness."""
-    place = sampled_place(complex, grading.cell_size, samples, *divmod(worst, len(samples) ** 2))
+def _too_thick(complex: CellComplex, grading: Grading, worst: _Worst) -> SoundnessError:
+    place = sampled_place(complex, grading.cell_size, worst.samples, worst.patch, worst.index)
     asked = float(grading.asked(np.array([place]))[0])
     if grading.density is None:
-        return SoundnessError("thickness", asked, place, factor * asked, reason, unit=" mm")
-    limit = density_of_thickness(factor * thickness_of_density(asked))
-    return SoundnessError("density", asked, place, limit, reason)
+        name = given_as("thickness", grading.thickness)
+        return SoundnessError(name, asked, place, worst.factor * asked, worst.reason, unit=" mm")
+    limit = density_of_thickness(worst.factor * thickness_of_density(asked))
+    return SoundnessError(given_as("density", grading.density), asked, place, limit, worst.reason)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -201,3 +202,79 @@ def test_components_are_those_of_scipys_graphs(nodes: int, links: int, seed: int
     graph = coo_array((np.ones(links), (first, second)), shape=(nodes, nodes))
     count, theirs = connected_components(graph, directed=False)
     assert len(set(zip(ours.tolist(), theirs.tolist(), strict=True))) == count == ours.max() + 1
+
+
+Cells = tuple[int, int, int]
+Closed = tuple[bool, bool, bool]
+CLOSINGS = st.tuples(*3 * [st.booleans()])
+ALL_ROUND = (True, True, True)
+
+
+def wrapped(places: NDArray[np.int64], cells: Cells, closed: Closed) -> NDArray[np.int64]:
+    """Places in quarters, those a block apart along closed axes made the same."""
+    return np.where(closed, places % (CELL_QUARTERS * np.array(cells)), places)
+
+
+@settings(max_examples=30, deadline=None)
+@given(BLOCKS, CLOSINGS, ARRANGEMENTS)
+def test_closing_joins_the_corners_that_lie_a_block_apart_and_no_others(
+    cells: Cells, closed: Closed, placements: Placements
+) -> None:
+    joined, opened = build_complex(cells, placements, closed), build_complex(cells, placements)
+    here, there = (lattice.corner_quarters[lattice.patch_corners] for lattice in (joined, opened))
+    np.testing.assert_array_equal(here, wrapped(there, cells, closed))
+    assert len(np.unique(joined.corner_quarters, axis=0)) == len(joined.corner_quarters)
+    np.testing.assert_array_equal(joined.patch_cell, opened.patch_cell)
+
+
+@settings(max_examples=30, deadline=None)
+@given(BLOCKS, CLOSINGS)
+def test_closing_joins_the_edges_that_lie_a_block_apart_and_no_others(cells: Cells, closed: Closed) -> None:
+    joined, opened = build_complex(cells, closed=closed), build_complex(cells)
+    ends = opened.corner_quarters[opened.fan_corner[opened.edge_fans]]
+    # Twice an edge's middle names it: no two edges cross.
+    period = CELL_QUARTERS * np.array(cells) * 2
+    middles = np.where(closed, ends.sum(axis=1) % period, ends.sum(axis=1))
+    places = np.unique(middles, axis=0, return_inverse=True)[1].ravel()
+    assert joined.edge_count == places.max() + 1
+    pairs = np.stack([places[opened.patch_edges].ravel(), joined.patch_edges.ravel()], axis=1)
+    assert len(np.unique(pairs, axis=0)) == joined.edge_count
+
+
+@settings(max_examples=30, deadline=None)
+@given(BLOCKS, CLOSINGS)
+def test_a_closed_complex_is_a_two_manifold_too(cells: Cells, closed: Closed) -> None:
+    lattice = build_complex(cells, closed=closed)
+    assert set(np.bincount(lattice.patch_edges.ravel()).tolist()) <= {1, 2}
+    np.testing.assert_array_equal(lattice.fan_corner[lattice.patch_fans], lattice.patch_corners)
+    patches = np.bincount(lattice.patch_fans.ravel(), minlength=lattice.fan_count)
+    free_edges = np.bincount(lattice.edge_fans[lattice.free].ravel(), minlength=lattice.fan_count)
+    assert np.all(patches[~lattice.border_fans] == 6)
+    np.testing.assert_array_equal(free_edges, np.where(lattice.border_fans, 2, 0))
+    sense = np.zeros(lattice.edge_count, dtype=int)
+    np.add.at(sense, lattice.patch_edges, np.where(lattice.edge_forward, 1, -1))
+    assert np.all(sense[~lattice.free] == 0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(BLOCKS, st.integers(0, 2))
+def test_no_edge_across_the_seam_is_free(cells: Cells, axis: int) -> None:
+    # Twice as many cells along the closed axis have twice as much border and twice of all else: no end counts.
+    closed: Closed = (axis == 0, axis == 1, axis == 2)
+    twice: Cells = (cells[0] * (1 + closed[0]), cells[1] * (1 + closed[1]), cells[2] * (1 + closed[2]))
+    one, two = build_complex(cells, closed=closed), build_complex(twice, closed=closed)
+    assert two.free.sum() == 2 * one.free.sum()
+    assert (two.edge_count, two.fan_count) == (2 * one.edge_count, 2 * one.fan_count)
+    assert one.free.sum() < build_complex(cells).free.sum()
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 1, 1), (1, 2, 3)])
+def test_closed_all_round_the_surface_has_no_border_and_its_periods_euler_characteristic(cells: Cells) -> None:
+    lattice, count = build_complex(cells, closed=ALL_ROUND), int(np.prod(cells))
+    assert euler_characteristic(lattice) == -8 * count
+    assert not lattice.free.any()
+    assert np.all(lattice.edge_patches[:, 1] > lattice.edge_patches[:, 0])
+    # Twenty-four quadrangles, two to an edge, six to a corner.
+    assert (lattice.patch_count, lattice.edge_count, lattice.fan_count) == (24 * count, 48 * count, 16 * count)
+    assert lattice.component_count == 1
+    assert lattice.pinch_lines == 0

@@ -14,7 +14,15 @@ from scipy.interpolate import BSpline
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.nurbs import NurbsCurve, NurbsSurface, basis, edge_row, gauss_points, uniform_knots
+from gyroid_cad.nurbs import (
+    NurbsCurve,
+    NurbsSurface,
+    basis,
+    edge_row,
+    gauss_points,
+    grid_derivatives,
+    uniform_knots,
+)
 
 Floats = NDArray[np.float64]
 
@@ -250,3 +258,38 @@ def test_arrays_are_copies_and_read_only() -> None:
 def test_there_is_one_weight_a_control_point() -> None:
     with pytest.raises(ParameterError, match=r"weights = \(3, 2\): expected one weight per control point: \(3, 3\)"):
         NurbsSurface(np.ones((3, 3, 3)), np.ones((3, 2)), ARC_KNOTS, ARC_KNOTS)
+
+
+def polynomial_surface() -> NurbsSurface:
+    surface = uneven_surface()
+    return NurbsSurface(surface.control_points, np.full((6, 4), 3.0), surface.knots_u, surface.knots_v)
+
+
+@pytest.mark.parametrize("lead", [(), (2,), (3, 2)])
+@pytest.mark.parametrize(
+    "surface",
+    [paper_surface(), uneven_surface(), polynomial_surface(), cylinder(2.0)],
+    ids=["paper", "uneven", "polynomial", "cylinder"],
+)
+def test_derivatives_of_many_nets_on_a_grid_are_those_of_each_surface(
+    surface: NurbsSurface, lead: tuple[int, ...]
+) -> None:
+    nets = np.random.default_rng(7).normal(size=(*lead, *surface.control_points.shape))
+    knots = (surface.knots_u, surface.knots_v)
+    u, v = (np.linspace(knot[0], knot[-1], count) for knot, count in zip(knots, (7, 5), strict=True))
+    together = grid_derivatives(nets, surface.weights, knots, u, v)
+    for index in np.ndindex(*lead):
+        d = NurbsSurface(nets[index], surface.weights, *knots).derivatives(u[:, np.newaxis], v[np.newaxis])
+        for mine, reference in zip(together, (d[0, 0], d[1, 0], d[0, 1]), strict=True):
+            assert mine.shape == (*lead, 7, 5, 3)
+            np.testing.assert_allclose(mine[index], reference, rtol=0, atol=1e-13 * np.abs(reference).max())
+
+
+def test_derivatives_on_a_grid_take_views_of_nets() -> None:
+    surface = uneven_surface()
+    pair = np.stack([surface.control_points, 2 * surface.control_points], axis=2)
+    knots, u, v = (surface.knots_u, surface.knots_v), np.linspace(-1, 1, 4), np.linspace(0, 3, 3)
+    views = grid_derivatives(np.moveaxis(pair, 2, 0), surface.weights, knots, u, v)
+    alone = grid_derivatives(surface.control_points, surface.weights, knots, u, v)
+    for both, one in zip(views, alone, strict=True):
+        np.testing.assert_allclose(both, [one, 2 * one], rtol=1e-13)

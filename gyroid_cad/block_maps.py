@@ -66,7 +66,7 @@ class Cylinder:
             cosine, sine, along = np.cos(rate * x), np.sin(rate * x), rate * (radius + z)
             return (-along * sine, 0, cosine), (along * cosine, 0, sine), (0, 1, 0)
 
-        return SpaceMap(function, jacobian, (closed, False, False))
+        return SpaceMap(function, jacobian, (closed, False, False), str(self))
 
     def __str__(self) -> str:
         return _spelled(self)
@@ -122,7 +122,7 @@ class Sphere:
                 (0, rise * level, north),
             )
 
-        return SpaceMap(function, jacobian, (closed, False, False))
+        return SpaceMap(function, jacobian, (closed, False, False), str(self))
 
     def __str__(self) -> str:
         return _spelled(self)
@@ -159,7 +159,7 @@ class Twist:
                 (0, 0, 1),
             )
 
-        return SpaceMap(function, jacobian)
+        return SpaceMap(function, jacobian, text=str(self))
 
     def __str__(self) -> str:
         return _spelled(self)
@@ -199,7 +199,7 @@ class Bend:
             cosine, sine = np.cos(turned), np.sin(turned)
             return (stretch * cosine, 0, -sine), (0, 1, 0), (stretch * sine, 0, cosine)
 
-        return SpaceMap(function, jacobian, (abs(self.angle) == FULL_TURN, False, False))
+        return SpaceMap(function, jacobian, (abs(self.angle) == FULL_TURN, False, False), str(self))
 
     def __str__(self) -> str:
         return _spelled(self)

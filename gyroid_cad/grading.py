@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import SoundnessError
 from gyroid_cad.fields import Field, evaluated, given_as
-from gyroid_cad.maps import SpaceMap, carried, differences
+from gyroid_cad.maps import OPEN, SpaceMap, carried, differences
 from gyroid_cad.tube import LARGEST_DENSITY, thickness_of_density
 
 __all__ = ["THINNEST_WALL", "Grading", "Laid"]
@@ -75,11 +75,14 @@ class Grading:
         return not isinstance(self.thickness, Field | None) and self.scale_field is None and self.map is None
 
     @property
+    def map_closes(self) -> tuple[bool, bool, bool]:
+        """Along which axes the map would join the ends of a block."""
+        return OPEN if self.map is None else self.map.closed
+
+    @property
     def closed(self) -> tuple[bool, bool, bool]:
-        """Along which axes the map joins the block's ends; a scale that varies would part them again."""
-        if self.map is None or self.scale_field is not None:
-            return False, False, False
-        return self.map.closed
+        """Along which axes the block's ends are joined; a scale would part them again."""
+        return OPEN if self.scale_field is not None else self.map_closes
 
     def lay(self, points: Floats, normals: Floats) -> Laid:
         """Carry points of the mid-surface and their normals to where they are wanted.
@@ -169,7 +172,7 @@ class Grading:
         parameter = given_as("thickness" if self.density is None else "density", value)
         values = _values(parameter, value, points)
         if self.density is None:
-            _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall")
+            _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall", unit=" mm")
             return values
         _require(parameter, values, points, 0.0, "above", "everywhere in the lattice")
         worst = int(np.argmax(values))
@@ -185,7 +188,7 @@ class Grading:
         # The wall is stretched with the space across it, as if it had been mapped itself: so the volume
         # fraction is kept, to first order in the thickness, however the map stretches.
         thickness = np.asarray(thickness_of_density(asked) * self.cell_size * spacing)
-        _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall in mm", "thickness")
+        _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall", "thickness", " mm")
         return thickness
 
 
@@ -214,13 +217,20 @@ def _positive_determinant(parameter: str, jacobian: Floats, points: Floats) -> F
 
 
 def _require(
-    parameter: str, values: Floats, points: Floats, limit: float, accepted: str, reason: str, quantity: str = ""
+    parameter: str,
+    values: Floats,
+    points: Floats,
+    limit: float,
+    accepted: str,
+    reason: str,
+    quantity: str = "",
+    unit: str = "",
 ) -> None:
     """Refuse values that are not "above", or not "at least", a limit everywhere."""
     worst = int(np.argmin(values))
     if not (values[worst] > limit or (accepted == "at least" and values[worst] == limit)):
         place = _place(points, worst)
-        raise SoundnessError(parameter, float(values[worst]), place, limit, reason, accepted, quantity)
+        raise SoundnessError(parameter, float(values[worst]), place, limit, reason, accepted, quantity, unit)
 
 
 def _place(points: Floats, index: int) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from gyroid_cad.block_maps import as_map, space_over
 from gyroid_cad.build import Build, Progress, Recipe, build, require_formats, require_settings
-from gyroid_cad.checks import finite_number
+from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
@@ -110,7 +110,7 @@ class Lattice:
             object.__setattr__(self, "map", as_map(self.map))
         self._require_fit()
         if not self.uniform:
-            self._grading()
+            self._require_variable()
         elif self.density is None:
             require_thickness(self.wall_thickness, self.cell_size)
         else:
@@ -286,6 +286,16 @@ class Lattice:
 
     def _measures(self) -> ExactMeasures:
         return _measures(self.cells, self._grading())
+
+    def _require_variable(self) -> None:
+        """What can be told of a lattice that varies before it is built."""
+        for name in ("thickness", "scale_field"):
+            if isinstance(value := getattr(self, name), float):
+                positive_number(name, value)
+        if isinstance(self.density, float):
+            require_density(self.density, self.cell_size)
+        if self.scale_field is not None and any(self._grading().map_closes):
+            raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
 
     def _require_fit(self) -> None:
         if not isinstance(self.fit, FitSettings):

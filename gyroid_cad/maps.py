@@ -52,6 +52,8 @@ class SpaceMap:
         component i; if left out, central differences of ``function`` take its place.
     closed : tuple of bool
         Along which axes the block's far end is carried exactly onto its near end, so that they are joined.
+    text : str
+        How it prints; the function's name if left out.
 
     Raises
     ------
@@ -61,6 +63,7 @@ class SpaceMap:
     function: MapFunction
     jacobian: JacobianFunction | None = None
     closed: tuple[bool, bool, bool] = OPEN
+    text: str = ""
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -78,7 +81,7 @@ class SpaceMap:
         return self
 
     def __str__(self) -> str:
-        return getattr(self.function, "__name__", type(self.function).__name__)
+        return self.text or str(getattr(self.function, "__name__", type(self.function).__name__))
 
 
 def carried(parameter: str, space: SpaceMap, points: Floats, step: float) -> tuple[Floats, Floats]:
@@ -151,7 +154,7 @@ def _asked(parameter: str, space: SpaceMap, function: Callable[..., Any], points
     try:
         return function(*points.copy())
     except Exception as problem:
-        reason = " ".join(f"{type(problem).__name__}: {problem}".split())
+        reason = " ".join(f"{type(problem).__name__}: {problem}"[:200].split())
         raise ParameterError(parameter, str(space), f"a map that can be evaluated; it raised {reason}") from problem
 
 

@@ -37,8 +37,13 @@ _NEAR_FOLDING, _FINE_SAMPLES = 1.25, 65
 # Parts of the half wall at which a wall that reaches past another is looked for.
 _ALONG_THE_WALL = np.arange(1, 8) / 8
 _COMPARED = 12
+# In steps between samples: borders are not straight, and what lies beside a border is not over the patch.
+_WITHIN_BORDER = 0.3
+# Two sheets that cross do so at more than this slope somewhere; side by side in one plane they do not.
+_LEAST_SLOPE = 0.3
 _FOLDS = "where the wall folds over its own curvature"
 _MEETS = "where the wall meets the one opposite"
+_CROSSES = "where the map carries two sheets through each other, whatever their thickness"
 _PATCHES_AT_ONCE = 64
 
 
@@ -164,9 +169,12 @@ def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats
 
     patch = np.repeat(np.arange(complex.patch_count), CLEARANCE_SAMPLES**2)
     reach = np.linalg.norm(half, axis=1)
-    lookup = _Lookup(cKDTree(middle), middle, half, reach, patch, complex.patch_corners)
+    lookup = _Lookup(cKDTree(middle), middle, half, reach, patch, complex.patch_corners, _grid_steps(middle))
     everywhere = np.arange(len(middle))
-    found = [lookup.crossing(everywhere)]
+    near, crossed = lookup.beside(everywhere)
+    if len(crossed):
+        return [_Worst(0.0, *divmod(int(crossed[0]), CLEARANCE_SAMPLES**2), samples, _CROSSES)]
+    found = [near]
     for side in (-1, 1):
         met, beyond = lookup.met(everywhere, side * half)
         found.append(met)
@@ -180,6 +188,19 @@ def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats
     return worst
 
 
+def _grid_steps(middle: Floats) -> Floats:
+    """At every sample, the longer of the two steps to the next samples along u, and along v; shape (n, 2, 3)."""
+    grid = middle.reshape(-1, CLEARANCE_SAMPLES, CLEARANCE_SAMPLES, 3)
+    steps = []
+    for axis in (1, 2):
+        between = np.diff(grid, axis=axis)
+        edge = np.take(between, [0], axis=axis), np.take(between, [-1], axis=axis)
+        before, after = (np.concatenate(pair, axis=axis) for pair in ((edge[0], between), (between, edge[1])))
+        longer = np.linalg.norm(before, axis=-1) > np.linalg.norm(after, axis=-1)
+        steps.append(np.where(longer[..., np.newaxis], before, after).reshape(-1, 3))
+    return np.stack(steps, axis=1)
+
+
 @dataclass(frozen=True, slots=True)
 class _Lookup:
     """Samples of all mid-surfaces, to be found by place."""
@@ -190,6 +211,7 @@ class _Lookup:
     reach: Floats
     patch: Integers
     corners: Integers
+    steps: Floats
 
     def met(self, samples: Integers, offsets: Floats) -> tuple[tuple[Integers, Floats], Integers]:
         """Which samples, moved by the offsets, lie in other walls, and what factor on both walls would part them.
@@ -210,18 +232,41 @@ class _Lookup:
         factor = _meeting_factor(apart, side * self.half[first[inside]], self.reach[second[inside]])
         return (first[inside], factor), first[other & ~inside]
 
-    def crossing(self, samples: Integers) -> tuple[Integers, Floats]:
-        """Which samples lie by a mid-surface that is no neighbour, nearer than both walls reach; and the same factor.
+    def beside(self, samples: Integers) -> tuple[tuple[Integers, Floats], Integers]:
+        """Which samples lie over a mid-surface that is no neighbour, nearer than both walls reach, and the same factor.
 
-        Walls thinner than the places looked at lie apart would else cross unseen.
+        Walls thinner than the places looked at lie apart would else pass unseen. Also those that the other mid-surface
+        parts from one of the places next to them: whatever the walls, these cross.
         """
         nearest = np.asarray(self.tree.query(self.middle[samples], k=min(_COMPARED, len(self.middle)))[1])
         first, second = np.repeat(samples, nearest.shape[1]), nearest.ravel()
         strangers = ~self._neighbours(first, second)
         first, second = first[strangers], second[strangers]
-        height = np.abs(_dot(self.middle[first] - self.middle[second], self.half[second])) / self.reach[second]
-        factor = height / (self.reach[first] + self.reach[second])
-        return first[factor < 1], factor[factor < 1]
+        over, height = self._over(first, second)
+        first, second, height = first[over], second[over], height[over]
+        factor = np.abs(height) / (self.reach[first] + self.reach[second])
+        parted = np.zeros(len(first), dtype=bool)
+        for next_to in (-1, 1, -CLEARANCE_SAMPLES, CLEARANCE_SAMPLES):
+            other = np.clip(first + next_to, 0, len(self.middle) - 1)
+            over, other_height = self._over(other, second)
+            rise = np.abs(height - other_height)
+            steep = rise > _LEAST_SLOPE * np.linalg.norm(self.middle[first] - self.middle[other], axis=1)
+            parted |= over & steep & (self.patch[other] == self.patch[first]) & (height * other_height < 0)
+        return (first[factor < 1], factor[factor < 1]), first[parted]
+
+    def _over(self, first: Integers, second: Integers) -> tuple[Booleans, Floats]:
+        """Whether the first samples stand over the cells round the second ones, and how high."""
+        apart = self.middle[first] - self.middle[second]
+        steps = self.steps[second]
+        # In steps of the grid, by least squares in the tangent plane.
+        products = np.einsum("psc,ptc->pst", steps, steps)
+        along = np.linalg.solve(products, np.einsum("psc,pc->ps", steps, apart)[..., np.newaxis])[..., 0]
+        height = _dot(apart, self.half[second]) / self.reach[second]
+        # Beyond its border a patch goes on in its neighbour, or not at all.
+        place = np.stack(np.divmod(second % CLEARANCE_SAMPLES**2, CLEARANCE_SAMPLES), axis=1)
+        low = np.where(place == 0, _WITHIN_BORDER, -1.0)
+        high = np.where(place == CLEARANCE_SAMPLES - 1, -_WITHIN_BORDER, 1.0)
+        return np.all((low <= along) & (along <= high), axis=1), height
 
     def _neighbours(self, first: Integers, second: Integers) -> Booleans:
         """Whether the patches of two samples share a corner."""

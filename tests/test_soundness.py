@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Callable, Iterator
 from math import pi, sqrt
 from typing import Any
@@ -19,7 +20,7 @@ from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import SoundnessError
 from gyroid_cad.exact_wall import laid_patches
 from gyroid_cad.fields import Field, as_field
-from gyroid_cad.grading import Grading
+from gyroid_cad.grading import THINNEST_WALL, Grading
 from gyroid_cad.maps import SpaceMap
 from gyroid_cad.nurbs import grid_derivatives
 from gyroid_cad.refit import fitted_wall
@@ -125,21 +126,12 @@ LIMITED: dict[str, tuple[Graded, Cells]] = {
     "dense slope": (graded("0.6 + 0.03*(x - 5)", "density", map=mapped("cylinder:radius=6")), ONE),
     "flat point": (graded(BUMP), ONE),
     "slit": (graded("0.8", map=mapped("cylinder:radius=6.4", RING)), RING),
-    "wound": (graded("0.5", map=turns(1.3, 8.3, 40)), RING),
-}
-BOTH: dict[str, tuple[Graded, Cells]] = {
-    "flat point": (graded("1 + 8*exp(-((x-5)**2+(y-5)**2+(z-5)**2)/4)"), ONE),
-    "wound": (graded("1.5", map=turns(1.3, 8.3, 40)), RING),
+    # Here it would fold too, a little later.
+    "flat point, broad": (graded("1 + 8*exp(-((x-5)**2+(y-5)**2+(z-5)**2)/4)"), ONE),
 }
 
 
-@pytest.mark.parametrize(
-    ("made", "cells"),
-    [
-        *(pytest.param(*LIMITED[name], id=name) for name in LIMITED),
-        *(pytest.param(*BOTH[name], id=f"{name}, thicker") for name in BOTH),
-    ],
-)
+@pytest.mark.parametrize(("made", "cells"), [pytest.param(*LIMITED[name], id=name) for name in LIMITED])
 def test_the_limit_is_the_largest_value_that_would_pass(made: Graded, cells: Cells) -> None:
     error = refused(made(1.0), cells)
     ratio = error.limit / error.value
@@ -196,21 +188,40 @@ def test_a_wall_that_grows_on_a_threefold_axis_is_limited_by_the_next_along_it(s
 @pytest.mark.parametrize(("count", "thickness"), [(1.05, 0.8), (1.3, 0.6), (1.5, 0.8), (2.03, 0.4), (2.0, 0.5)])
 def test_a_block_wound_through_itself_is_refused(count: float, thickness: float) -> None:
     error = refused(Grading(L, thickness, map=turns(count, 40 * count / 6.3, 40)), RING)
-    assert "where the wall meets the one opposite" in str(error)
+    assert re.search("meets the one opposite|sheets through each other", str(error))
 
 
 @pytest.mark.parametrize(
-    "varied",
+    ("varied", "cells", "thickness"),
     [
-        {"map": turns(1.3, 8.3, 40)},
-        {"map": turns(1.05, 6.7, 40)},
-        {"map": mapped("cylinder:radius=8,angle=360", RING), "scale_field": 1.1},
+        pytest.param({"map": turns(1.3, 8.3, 40)}, RING, 0.1, id="wound"),
+        pytest.param({"map": turns(1.05, 6.7, 40)}, RING, 0.1, id="wound a little"),
+        pytest.param({"map": mapped("cylinder:radius=8,angle=360", RING), "scale_field": 1.1}, RING, 0.1, id="long"),
+        pytest.param({"map": turns(1.05, 63 / 2 / pi, 60)}, (6, 1, 1), 0.05, id="thinner"),
     ],
-    ids=["wound", "wound a little", "a ring too long"],
 )
-def test_a_thin_wall_wound_through_itself_is_refused(varied: dict[str, Any]) -> None:
-    # The mid-surfaces themselves cross: no thickness would do.
-    assert refusal(Grading(L, 0.1, **varied), RING) is not None
+def test_a_thin_wall_wound_through_itself_is_refused(varied: dict[str, Any], cells: Cells, thickness: float) -> None:
+    assert refusal(Grading(L, thickness, **varied), cells) is not None
+
+
+def test_where_mid_surfaces_cross_no_thickness_is_said_to_pass() -> None:
+    made = graded("0.5", map=turns(1.3, 8.3, 40))
+    error = refused(made(1.0), RING)
+    assert error.limit < THINNEST_WALL or refusal(made(error.limit / error.value * (1 - 1e-3)), RING) is not None
+
+
+@pytest.mark.parametrize("squeeze", [0.3, 0.15, 0.05, 0.02])
+def test_a_thin_wall_stays_clear_of_itself_under_affine_maps(squeeze: float) -> None:
+    for axis in range(3):
+        stretched = np.ones(3)
+        stretched[axis] = squeeze
+        assert refusal(Grading(L, 1e-3 * squeeze * L, map=affine(np.diag(stretched)))) is None
+
+
+@pytest.mark.parametrize("gap", [4.0, 2.0, 0.8])
+def test_a_ring_with_a_slit_wider_than_its_wall_is_sound(gap: float) -> None:
+    # Its ends, once joined, are moved apart along the circumference.
+    assert refusal(Grading(L, 0.1, map=mapped(f"cylinder:radius={(4 * L + gap) / 2 / pi}", RING)), RING) is None
 
 
 def test_a_ring_is_sound_joined_and_refused_where_its_ends_only_touch() -> None:

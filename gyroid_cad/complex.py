@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.symmetry import CELL_QUARTERS, Placements, cubic_cell, placed_corners
 
-__all__ = ["CellComplex", "build_complex"]
+__all__ = ["CellComplex", "build_complex", "connected"]
 
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
@@ -173,7 +173,7 @@ def build_complex(
         edge_fans=edge_fans,
         fan_corner=fan_corner,
         corner_quarters=corner_quarters,
-        patch_component=_connected(len(patch_placement), shared[:, 0], shared[:, 1]),
+        patch_component=connected(len(patch_placement), shared[:, 0], shared[:, 1]),
     )
 
 
@@ -215,13 +215,13 @@ def _fans(
     order = np.argsort(patch_edges.ravel(), kind="stable")
     gathered = ends.reshape(-1, 2)[order]
     shared = np.flatnonzero(np.diff(patch_edges.ravel()[order]) == 0)
-    labels = _connected(patch_corners.size, gathered[shared].ravel(), gathered[shared + 1].ravel())
+    labels = connected(patch_corners.size, gathered[shared].ravel(), gathered[shared + 1].ravel())
     fan_corner = np.empty(labels.max() + 1, dtype=np.int64)
     fan_corner[labels] = patch_corners.ravel()
     return labels.reshape(-1, 4), fan_corner
 
 
-def _connected(count: int, first: Integers, second: Integers) -> Integers:
+def connected(count: int, first: Integers, second: Integers) -> Integers:
     """Label the connected components of a graph on ``count`` nodes, from 0; shape (count,).
 
     Every node takes its neighbours' lowest label until none changes. ``scipy.sparse.csgraph`` does the same,

@@ -21,6 +21,7 @@ __all__ = [
     "exact_measures",
     "interpolation_matrix",
     "laid_patches",
+    "patch_points",
     "sampled_place",
 ]
 
@@ -61,6 +62,12 @@ def laid_patches(
         placement, corner = complex.patch_placement[patches[some]], complex.patch_cell[patches[some]]
         places = points[placement] + (corner * grading.cell_size)[:, np.newaxis]
         yield some, grading.lay(places.reshape(-1, 3), normals[placement].reshape(-1, 3))
+
+
+def patch_points(complex: CellComplex, cell_size: float, samples: Floats) -> Floats:
+    """Points of every patch before any map, in mm; shape (patches, m * m, 3) for m samples along each side."""
+    points, _ = _placed_grid(complex, cell_size, samples)
+    return np.asarray(points[complex.patch_placement] + (complex.patch_cell * cell_size)[:, np.newaxis])
 
 
 def sampled_place(

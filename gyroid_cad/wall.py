@@ -7,7 +7,7 @@ along the common normal, for a placement that exchanges the sides also turns the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,10 @@ class Wall:
             hull = towards * (reaches(self.nets, axis=(1, 2, 3))[self.patch_net] + shift)
             bounds.append([towards * self._furthest(axis, towards, hull[:, axis]) for axis in range(3)])
         return np.array(bounds[0]), np.array(bounds[1])
+
+    def moved(self, rotation: Floats, translation: Floats) -> Wall:
+        """The wall after p -> rotation p + translation, in mm."""
+        return replace(self, nets=self.nets @ rotation.T, shifts=self.shifts @ rotation.T + translation)
 
     def _furthest(self, axis: int, towards: int, hull: Floats) -> float:
         """Least value of ``towards`` times a coordinate over all faces, given what their control points reach."""

@@ -198,7 +198,7 @@ def test_placements_that_pass_an_edge_to_three_patches_are_refused() -> None:
 @given(st.integers(1, 60), st.integers(0, 90), st.integers(0, 2**32 - 1))
 def test_components_are_those_of_scipys_graphs(nodes: int, links: int, seed: int) -> None:
     first, second = np.random.default_rng(seed).integers(0, nodes, (2, links))
-    ours = complex_module._connected(nodes, first, second)
+    ours = complex_module.connected(nodes, first, second)
     graph = coo_array((np.ones(links), (first, second)), shape=(nodes, nodes))
     count, theirs = connected_components(graph, directed=False)
     assert len(set(zip(ours.tolist(), theirs.tolist(), strict=True))) == count == ours.max() + 1

@@ -62,6 +62,9 @@ def topology(shape: TopoDS_Shape) -> Topology:
     uses: dict[tuple[int, TopAbs_Orientation], int] = {}
     # The explorer visits an edge once for each face it bounds, oriented as that face uses it.
     for edge in _parts(shape, TopAbs_EDGE):
+        # An edge shrunk to a point, as at the pole of a sphere, bounds one face only.
+        if BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
+            continue
         use = (edges.Add(edge), edge.Orientation())
         uses[use] = uses.get(use, 0) + 1
     both = ((uses.get((i, TopAbs_FORWARD)), uses.get((i, TopAbs_REVERSED))) for i in range(1, edges.Extent() + 1))

@@ -32,7 +32,7 @@ from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface
 from gyroid_cad.nurbs import NurbsCurve
 from gyroid_cad.wall import SIDES, Wall
 
-__all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise"]
+__all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise", "realise_faces"]
 
 KernelShape = TopoDS_Shape
 
@@ -57,6 +57,21 @@ def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> T
         Or a TopoDS_Compound of solids where the lattice falls into pieces that share no edge.
     """
     return _Realisation(wall).build(progress or (lambda done, total: None))
+
+
+def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
+    """The two faces of every patch, without side walls, neighbours sharing their edges.
+
+    Parameters
+    ----------
+    wall : Wall
+
+    Returns
+    -------
+    list of (TopoDS_Face, TopoDS_Face)
+        By patch: on side 0 and on side 1, both oriented along the common normal.
+    """
+    return _Realisation(wall).faces()
 
 
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
@@ -105,6 +120,11 @@ class _Realisation:
                 progress(patch, self.complex.patch_count)
         progress(self.complex.patch_count, self.complex.patch_count)
         return self._solids(shells)
+
+    def faces(self) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
+        self.vertices = self._make_vertices()
+        self.edges = self._make_edges()
+        return [(self._make_face(patch, 0), self._make_face(patch, 1)) for patch in range(self.complex.patch_count)]
 
     def _new_shell(self) -> TopoDS_Shell:
         shell = TopoDS_Shell()

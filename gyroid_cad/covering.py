@@ -1,0 +1,124 @@
+"""The patches of an endless lattice that a part needs: where they are, and which the part's boundary crosses.
+
+Patches wholly inside or outside the part need no cutting. Those that the boundary stays clear of hang together by
+their edges, and each such group is all inside or all outside: one point tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.complex import CellComplex, build_complex, connected
+from gyroid_cad.exact_wall import patch_points
+from gyroid_cad.symmetry import CELL_QUARTERS, cubic_cell
+
+__all__ = ["CROSSING", "INSIDE", "OUTSIDE", "Frame", "covering_complex", "patch_sides"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+OUTSIDE, CROSSING, INSIDE = -1, 0, 1
+# From the middle of a patch to its corners, in quarters of the bounding-cell length: (2, 0, 1).
+_PATCH_RADIUS = np.sqrt(5) / CELL_QUARTERS
+_SAMPLES = 7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """Where the lattice stands: p -> rotation p + origin, from its own space to that of the part.
+
+    Attributes
+    ----------
+    origin : ndarray, shape (3,)
+        In mm.
+    rotation : ndarray, shape (3, 3)
+    """
+
+    origin: Floats
+    rotation: Floats
+
+    def own(self, points: Floats) -> Floats:
+        """Points of the part's space in the lattice's own; shape (..., 3)."""
+        return (points - self.origin) @ self.rotation
+
+    def placed(self, points: Floats) -> Floats:
+        """Points of the lattice's own space in the part's; shape (..., 3)."""
+        return points @ self.rotation.T + self.origin
+
+
+def covering_complex(low: Floats, high: Floats, frame: Frame, cell_size: float, reach: float) -> CellComplex:
+    """All patches that come within reach of a box in the part's space.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (3,)
+        Corners of the box, in mm.
+    frame : Frame
+    cell_size : float
+        In mm.
+    reach : float
+        Half the wall or whatever else stands off the mid-surface, in mm.
+    """
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    own = frame.own(corners)
+    margin = reach + _PATCH_RADIUS * cell_size
+    first = np.floor((own.min(axis=0) - margin) / cell_size).astype(np.int64) - 1
+    last = np.ceil((own.max(axis=0) + margin) / cell_size).astype(np.int64) + 1
+    placements = cubic_cell()
+    centres = placements.translations / CELL_QUARTERS * cell_size
+
+    def near(placement: Integers, cell: Integers) -> Booleans:
+        places = frame.placed(centres[placement] + cell * cell_size)
+        return np.asarray(np.all((places > low - margin) & (places < high + margin), axis=1))
+
+    nx, ny, nz = (last - first).tolist()
+    x, y, z = first.tolist()
+    return build_complex((nx, ny, nz), placements, first=(x, y, z), wanted=near)
+
+
+def patch_sides(
+    complex: CellComplex,
+    frame: Frame,
+    cell_size: float,
+    reach: float,
+    distance: Callable[[Floats], Floats],
+    holds: Callable[[Floats], Booleans],
+) -> Integers:
+    """Which patches lie inside a part, outside it, or may be crossed by its boundary; shape (patches,).
+
+    Parameters
+    ----------
+    complex : CellComplex
+    frame : Frame
+    cell_size, reach : float
+        In mm.
+    distance : callable
+        Of points (n, 3) in the part's space: no more than their distance from its boundary, in mm.
+    holds : callable
+        Which of some points lie inside the part.
+    """
+    samples = np.linspace(-1, 1, _SAMPLES)
+    points = frame.placed(patch_points(complex, cell_size, samples))
+    middle = points[:, _SAMPLES**2 // 2]
+    clear = distance(middle) > _PATCH_RADIUS * cell_size + reach
+    near = np.flatnonzero(~clear)
+    # Every place of a patch is within half a step between samples, along both sides, of one of them.
+    grid = points.reshape(-1, _SAMPLES, _SAMPLES, 3)
+    steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)]
+    clear[near] = (
+        distance(points[near].reshape(-1, 3)).reshape(len(near), _SAMPLES**2).min(axis=1) > sum(steps) / 2 + reach
+    )
+    sides = np.full(complex.patch_count, CROSSING)
+    both = complex.edge_patches[~complex.free]
+    both = both[clear[both].all(axis=1)]
+    group = connected(complex.patch_count, both[:, 0], both[:, 1])
+    groups, first = np.unique(group[clear], return_index=True)
+    inside = np.zeros(complex.patch_count, dtype=bool)
+    inside[groups] = holds(middle[np.flatnonzero(clear)[first]])
+    sides[clear] = np.where(inside[group[clear]], INSIDE, OUTSIDE)
+    return sides

@@ -1,0 +1,159 @@
+"""A part from CAD: read, found sound, measured, and told apart from the space round it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.gp import gp_Pnt
+from OCP.GProp import GProp_GProps
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_ShapeEnum, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
+
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.kernel.check import is_valid, topology
+
+__all__ = ["Part", "measure", "parts_of", "require_part"]
+
+Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+
+# Of the triangles that distances are measured from, in parts of the largest extent.
+_DEFLECTION = 1e-3
+_ANGULAR_DEFLECTION = 0.5
+_CLASSIFYING_TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Closed, valid solids.
+
+    Attributes
+    ----------
+    shape : TopoDS_Shape
+    solids : tuple of TopoDS_Solid
+    low, high : ndarray, shape (3,)
+        Corners of the bounding box, in mm.
+    volume : float
+        In mm3.
+    """
+
+    shape: TopoDS_Shape
+    solids: tuple[TopoDS_Solid, ...]
+    low: Floats
+    high: Floats
+    volume: float
+
+    def holds(self, points: Floats) -> Booleans:
+        """Which points, shape (n, 3), lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
+        inside = np.zeros(len(points), dtype=bool)
+        for solid in self.solids:
+            classifier = BRepClass3d_SolidClassifier(solid)
+            for index in np.flatnonzero(~inside).tolist():
+                classifier.Perform(gp_Pnt(*points[index].tolist()), _CLASSIFYING_TOLERANCE)
+                inside[index] = classifier.State() == TopAbs_IN
+        return inside
+
+    def surface_samples(self, spacing: float) -> tuple[Floats, float]:
+        """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
+
+        Parameters
+        ----------
+        spacing : float
+            Between the points, in mm.
+
+        Returns
+        -------
+        points : ndarray, shape (n, 3)
+        error : float
+        """
+        deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
+        copy = BRepBuilderAPI_Copy(self.shape, False, False).Shape()
+        BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
+        clouds = [_spread(*triangles, spacing) for triangles in _triangles(copy)]
+        return np.concatenate(clouds), spacing + deflection
+
+
+def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
+    """The solids of a shape, if they are closed, valid and the right way out.
+
+    Raises
+    ------
+    ParameterError
+        Saying what is wrong with it.
+    """
+    if shape is None or shape.IsNull():
+        raise ParameterError(parameter, shape, "a shape that holds a solid, not an empty one")
+    solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(shape, TopAbs_SOLID))
+    if not solids:
+        kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
+        raise ParameterError(parameter, kind, "a closed solid: there is none in it")
+    kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
+    for index, solid in enumerate(solids, 1):
+        which = "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"
+        if open_edges := topology(solid).open_edges:
+            raise ParameterError(parameter, kind, f"a closed solid: {which} has {open_edges} open edges")
+        if not is_valid(solid):
+            raise ParameterError(parameter, kind, f"a valid solid: the kernel finds fault with {which}")
+        if not measure(solid)[0] > 0:
+            raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape, box, False, False)
+    corners = np.array(box.Get())
+    return Part(shape, solids, corners[:3], corners[3:], sum(measure(solid)[0] for solid in solids))
+
+
+def measure(shape: TopoDS_Shape) -> tuple[float, float]:
+    """Volume in mm3 and surface area in mm2 (``BRepGProp``)."""
+    volume, area = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, volume)
+    BRepGProp.SurfaceProperties_s(shape, area)
+    return float(volume.Mass()), float(area.Mass())
+
+
+def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+    """The faces, edges or solids of a shape, one for each time it is used."""
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Corners of the triangles of each meshed face: three arrays of shape (triangles, 3)."""
+    for part in parts_of(shape, TopAbs_FACE):
+        location = TopLoc_Location()
+        mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(part), location)
+        if mesh is None:
+            continue
+        move = location.Transformation()
+        points = (mesh.Node(index).Transformed(move) for index in range(1, mesh.NbNodes() + 1))
+        nodes = np.array([(point.X(), point.Y(), point.Z()) for point in points])
+        corners = np.array([mesh.Triangle(index).Get() for index in range(1, mesh.NbTriangles() + 1)]) - 1
+        yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
+
+
+def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> Floats:
+    """Points of triangles, their corners among them, so that no place is further than the spacing from one."""
+    steps = [np.ceil(np.linalg.norm(end - a, axis=1) / spacing).astype(int).clip(1) for end in (b, c)]
+    clouds = []
+    for along_b, along_c in np.unique(np.stack(steps, axis=1), axis=0).tolist():
+        alike = (steps[0] == along_b) & (steps[1] == along_c)
+        u, v = (np.linspace(0, 1, count + 1) for count in (along_b, along_c))
+        u, v = (grid.ravel() for grid in np.meshgrid(u, v))
+        # Beyond the third side points are moved onto it: a place near it is then no further from one.
+        excess = np.maximum(u + v, 1)
+        u, v = (u / excess)[:, np.newaxis, np.newaxis], (v / excess)[:, np.newaxis, np.newaxis]
+        clouds.append((a[alike] + u * (b - a)[alike] + v * (c - a)[alike]).reshape(-1, 3))
+    return np.unique(np.concatenate(clouds), axis=0)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         smooth_minimum,
     )
     from gyroid_cad.fields import Field
+    from gyroid_cad.fill import Filled, FillReport, fill
     from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.maps import SpaceMap
@@ -36,6 +37,8 @@ __all__ = [
     "Cylinder",
     "ExportError",
     "Field",
+    "FillReport",
+    "Filled",
     "FitError",
     "FitReport",
     "FitSettings",
@@ -55,6 +58,7 @@ __all__ = [
     "distance_from_axis",
     "distance_from_point",
     "expression",
+    "fill",
     "fit_patch",
     "fit_report",
     "linear",
@@ -80,6 +84,7 @@ _HOMES = {
         "smooth_maximum",
         "smooth_minimum",
     ),
+    "fill": ("FillReport", "Filled", "fill"),
     "fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
     "maps": ("SpaceMap",),

@@ -25,7 +25,17 @@ from gyroid_cad.wall import Wall, build_wall
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["FORMATS", "Build", "Progress", "Recipe", "build", "require_formats", "require_settings"]
+__all__ = [
+    "FORMATS",
+    "Build",
+    "Progress",
+    "Recipe",
+    "build",
+    "require_formats",
+    "require_settings",
+    "tell",
+    "write_shape",
+]
 
 Progress = Callable[[str, int, int], None]
 
@@ -90,7 +100,7 @@ class Build:
             from gyroid_cad.kernel.check import enclosed_volume, topology
             from gyroid_cad.kernel.solid import realise
         with self.timed("solid", progress):
-            self._shape = realise(self.wall, lambda done, total: _tell(progress, "solid", done, total))
+            self._shape = realise(self.wall, lambda done, total: tell(progress, "solid", done, total))
         with self.timed("check", progress):
             self.topology = topology(self._shape)
             self.volume = enclosed_volume(self._shape)
@@ -126,9 +136,9 @@ class Build:
     def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
         """Tell that a stage begins and ends, and add the seconds between."""
         start = time.perf_counter()
-        _tell(progress, stage, 0, 1)
+        tell(progress, stage, 0, 1)
         yield
-        _tell(progress, stage, 1, 1)
+        tell(progress, stage, 1, 1)
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
 
     @cached_property
@@ -175,22 +185,12 @@ class Build:
             If the kernel finds the solid invalid: then nothing is written.
         ExportError
         """
-        from gyroid_cad.kernel.brep import write_brep
-        from gyroid_cad.kernel.step import write_step
-        from gyroid_cad.kernel.stl import write_stl
-
         _require_memory(self.cells, _FILE_BYTES_PER_CELL, len(self.wall.weights))
         if not self.valid(progress):
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                match FORMATS[path.suffix.lower()]:
-                    case "step":
-                        write_step(self._shape, path, schema)
-                    case "brep":
-                        write_brep(self._shape, path)
-                    case _:
-                        write_stl(self._shape, path, deviation, angle)
+                write_shape(self._shape, path, schema, deviation, angle)
 
     def _require_closed_and_full(self) -> None:
         if not self.topology.closed:
@@ -204,6 +204,26 @@ class Build:
                 f"the kernel's shape of {self.cells} cells encloses {self.volume:.9g} mm3, "
                 f"its control nets {expected:.9g} mm3"
             )
+
+
+def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, angle: float, cut: bool = False) -> None:
+    """Write a shape, whose faces may have been cut, in the format of the path's ending.
+
+    Raises
+    ------
+    ExportError
+    """
+    from gyroid_cad.kernel.brep import write_brep
+    from gyroid_cad.kernel.step import write_step
+    from gyroid_cad.kernel.stl import write_stl
+
+    match FORMATS[path.suffix.lower()]:
+        case "step":
+            write_step(shape, path, schema, parameter_curves=cut)
+        case "brep":
+            write_brep(shape, path)
+        case _:
+            write_stl(shape, path, deviation, angle)
 
 
 _builds: OrderedDict[Recipe, Build] = OrderedDict()
@@ -287,6 +307,7 @@ def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int, control_po
         )
 
 
-def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
+def tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
+    """Tell how far a stage has come, if anyone listens."""
     if progress is not None:
         progress(stage, done, total)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gyroid_cad.cli_fill import fill_command
 from gyroid_cad.errors import GyroidError, ParameterError
-from gyroid_cad.tables import print_summary, print_table
+from gyroid_cad.tables import print_summary, print_table, shown_progress
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
 _CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
-
-Progress = Callable[[str, int, int], None]
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -136,7 +134,7 @@ def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **
         return
     outputs = given["output"]
     settings = {name: given[name] for name in ("schema", "deviation", "angle")}
-    with _progress(shown=sys.stderr.isatty() and not quiet) as progress:
+    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
         report = lattice.report(progress)
     summary = _summary(report, outputs, time.perf_counter() - start)
@@ -172,6 +170,9 @@ def _lattice(given: dict[str, Any]) -> Lattice:
         raise click.UsageError("give exactly one of --thickness and --density")
     own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance")}
     return Lattice(given["cells"], given["cell_size"], **own, fit=fit)
+
+
+commands.add_command(fill_command)
 
 
 @commands.command("fit-report")
@@ -263,14 +264,6 @@ def _fit_settings(fit: str, control_points: int) -> Any:
     if control_points != settings.control_points:
         raise ParameterError("control_points", control_points, "10, the paper's own, with --fit paper")
     return settings
-
-
-def _progress(shown: bool) -> AbstractContextManager[Progress | None]:
-    if not shown:
-        return nullcontext(None)
-    from gyroid_cad.progress import terminal_progress
-
-    return terminal_progress()
 
 
 def _summary(report: LatticeReport, outputs: Sequence[str], total: float) -> dict[str, Any]:

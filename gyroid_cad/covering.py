@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.complex import CellComplex, build_complex, connected
-from gyroid_cad.exact_wall import patch_points
+from gyroid_cad.exact_wall import patch_points, patch_points_and_normals
 from gyroid_cad.symmetry import CELL_QUARTERS, cubic_cell
 
-__all__ = ["CROSSING", "INSIDE", "OUTSIDE", "Frame", "covering_complex", "patch_sides"]
+__all__ = ["CROSSING", "INSIDE", "OUTSIDE", "Frame", "covering_complex", "patch_sides", "signed_offsets"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -26,6 +26,7 @@ OUTSIDE, CROSSING, INSIDE = -1, 0, 1
 # From the middle of a patch to its corners, in quarters of the bounding-cell length: (2, 0, 1).
 _PATCH_RADIUS = np.sqrt(5) / CELL_QUARTERS
 _SAMPLES = 7
+_OFFSET_SAMPLES = 17
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,3 +123,29 @@ def patch_sides(
     inside[groups] = holds(middle[np.flatnonzero(clear)[first]])
     sides[clear] = np.where(inside[group[clear]], INSIDE, OUTSIDE)
     return sides
+
+
+def signed_offsets(complex: CellComplex, frame: Frame, cell_size: float, points: Floats) -> Floats:
+    """How far points of the part's space lie from the mid-surface, along its normal, to about 1e-3 cell sizes.
+
+    Parameters
+    ----------
+    complex : CellComplex
+        Patches that cover the points.
+    frame : Frame
+    cell_size : float
+        In mm.
+    points : ndarray, shape (n, 3)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        In mm; positive on the side that the common normal points to.
+    """
+    from scipy.spatial import cKDTree
+
+    samples = np.linspace(-1, 1, _OFFSET_SAMPLES)
+    places, normals = (a.reshape(-1, 3) for a in patch_points_and_normals(complex, cell_size, samples))
+    own = frame.own(points)
+    nearest = cKDTree(places).query(own)[1]
+    return np.asarray(np.sum((own - places[nearest]) * normals[nearest], axis=1))

@@ -22,6 +22,7 @@ __all__ = [
     "interpolation_matrix",
     "laid_patches",
     "patch_points",
+    "patch_points_and_normals",
     "sampled_place",
 ]
 
@@ -66,8 +67,14 @@ def laid_patches(
 
 def patch_points(complex: CellComplex, cell_size: float, samples: Floats) -> Floats:
     """Points of every patch before any map, in mm; shape (patches, m * m, 3) for m samples along each side."""
-    points, _ = _placed_grid(complex, cell_size, samples)
-    return np.asarray(points[complex.patch_placement] + (complex.patch_cell * cell_size)[:, np.newaxis])
+    return patch_points_and_normals(complex, cell_size, samples)[0]
+
+
+def patch_points_and_normals(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
+    """The same, and the unit normals on the common side, of the same shape."""
+    points, normals = _placed_grid(complex, cell_size, samples)
+    corners = (complex.patch_cell * cell_size)[:, np.newaxis]
+    return points[complex.patch_placement] + corners, normals[complex.patch_placement]
 
 
 def sampled_place(

@@ -1,12 +1,15 @@
-"""Tables on standard output: what was built, and how exactly."""
+"""What the terminal shows: tables of what was built and how exactly, and how far the work has come."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-__all__ = ["print_summary", "print_table"]
+__all__ = ["print_fill", "print_summary", "print_table", "shown_progress"]
+
+Progress = Callable[[str, int, int], None]
 
 # Columns of a pipe, which has none.
 _UNWRAPPED = 100_000
@@ -34,6 +37,38 @@ def print_summary(summary: dict[str, Any]) -> None:
         ("time", f"{summary['seconds']['total']:.2f} s"),
     ]
     print_table(None, rows)
+
+
+def print_fill(summary: dict[str, Any]) -> None:
+    """Print a filled part's report, its files and the time it took.
+
+    Parameters
+    ----------
+    summary : dict
+        The report's values, with ``files`` and ``seconds["total"]``.
+    """
+    islands = f"{summary['islands']} left, {summary['dropped']} dropped"
+    rows = [
+        ("kind", f"{summary['kind']}, cells of {summary['cell_size']:g} mm, wall {summary['thickness']:.6g} mm"),
+        ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
+        ("volume", f"{summary['volume']:.8g} mm3 of {summary['part_volume']:.8g}, density {summary['density']:.5f}"),
+        ("surface", f"{summary['area']:.6g} mm2"),
+        *([] if summary["mass"] is None else [("mass", f"{summary['mass']:.4g} g of {summary['part_mass']:.4g} g")]),
+        ("islands", islands),
+        *([("shifted by", f"{summary['shift']} mm: the kernel failed without")] if any(summary["shift"]) else []),
+        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
+        ("time", f"{summary['seconds']['total']:.2f} s"),
+    ]
+    print_table(None, rows)
+
+
+def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
+    """A progress display on the terminal while the context lasts, or none."""
+    if not shown:
+        return nullcontext(None)
+    from gyroid_cad.progress import terminal_progress
+
+    return terminal_progress()
 
 
 def _range(summary: dict[str, Any]) -> str:

@@ -23,6 +23,7 @@ __all__ = [
     "THICKNESS_LIMIT",
     "density_of_thickness",
     "face_area",
+    "offset_of_network",
     "thickness_of_density",
 ]
 
@@ -84,3 +85,22 @@ def thickness_of_density(density: float | Floats) -> float | Floats:
 def face_area(thickness: float) -> float:
     """Area per cell of each face of the wall, in squared cell sizes; thickness in cell sizes."""
     return AREA_PER_CELL + 2 * pi * EULER_CHARACTERISTIC * (thickness / 2) ** 2
+
+
+def offset_of_network(density: float) -> float:
+    """How far from the surface a labyrinth begins that takes up a given part of space.
+
+    One labyrinth is half of space less half of a wall: 1/2 - A s - (2 pi chi / 3) s^3 at the distance s.
+
+    Parameters
+    ----------
+    density : float
+        Above (1 - LARGEST_DENSITY) / 2, below (1 + LARGEST_DENSITY) / 2.
+
+    Returns
+    -------
+    float
+        Along the normal, in cell sizes; negative where the labyrinth takes up more than half.
+    """
+    half = thickness_of_density(abs(1 - 2 * density)) / 2
+    return half if density < 0.5 else -half

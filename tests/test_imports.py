@@ -50,9 +50,12 @@ ROWS = [
     ["kernel.split"],
     ["build"],
     ["paper", "limits", "report"],
+    ["fill"],
     ["lattice"],
     ["__init__"],
-    ["cq_plugin", "bd_objects", "progress", "config", "tables"],
+    ["cq_plugin", "bd_objects", "progress", "config"],
+    ["tables"],
+    ["cli_fill"],
     ["cli"],
     ["__main__"],
 ]

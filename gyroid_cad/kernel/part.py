@@ -16,6 +16,7 @@ from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
+from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_ShapeEnum, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
@@ -111,7 +112,20 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, box, False, False)
     corners = np.array(box.Get())
-    return Part(shape, solids, corners[:3], corners[3:], sum(measure(solid)[0] for solid in solids))
+    divided = _without_seams(shape)
+    solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(divided, TopAbs_SOLID))
+    return Part(divided, solids, corners[:3], corners[3:], sum(measure(solid)[0] for solid in solids))
+
+
+def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
+    """The shape with spheres, cylinders and the like in two halves (``ShapeUpgrade_ShapeDivideClosed``).
+
+    A face that closes on itself and is then cut loses its sense in STEP files: the kernel's reader gives another face.
+    """
+    divide = ShapeUpgrade_ShapeDivideClosed(shape)
+    divide.Perform()
+    divided = divide.Result()
+    return shape if divided is None or divided.IsNull() or not is_valid(divided) else divided
 
 
 def measure(shape: TopoDS_Shape) -> tuple[float, float]:

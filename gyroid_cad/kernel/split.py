@@ -58,14 +58,14 @@ class Pieces:
     boundary: tuple[TopoDS_Face, ...]
 
 
-def split(part: Part, faces: Sequence[TopoDS_Face]) -> Pieces:
+def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     """Split a part's boundary and faces where they cross.
 
     Parameters
     ----------
     part : Part
-    faces : sequence of TopoDS_Face
-        That share their edges.
+    faces : sequence of TopoDS_Shape
+        Faces that share their edges.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def split(part: Part, faces: Sequence[TopoDS_Face]) -> Pieces:
 
 
 def bounded_solids(
-    pieces: Pieces, whole: Iterable[TopoDS_Face], wanted_at: Callable[[Floats], bool]
+    pieces: Pieces, whole: Iterable[TopoDS_Shape], wanted_at: Callable[[Floats], bool]
 ) -> list[TopoDS_Solid]:
     """The solids bounded by faces of the lattice and by those pieces of the part's boundary on their inner side.
 
@@ -103,7 +103,7 @@ def bounded_solids(
     ----------
     pieces : Pieces
         Lattice faces oriented out of the solid wanted.
-    whole : iterable of TopoDS_Face
+    whole : iterable of TopoDS_Shape
         Faces that lie in the part uncut, oriented likewise.
     wanted_at : callable
         Whether a point, shape (3,), on the part's boundary belongs to the solid wanted: asked only of pieces of the
@@ -118,8 +118,7 @@ def bounded_solids(
     KernelError
         If the faces do not close, or do not agree on what is inside.
     """
-    lattice = [*pieces.inside, *whole]
-    faces = [*lattice, *_inner_boundary(pieces, wanted_at)]
+    faces = [*pieces.inside, *map(TopoDS.Face_s, whole), *_inner_boundary(pieces, wanted_at)]
     users = _users(faces)
     if any({use.orientation for use in uses} != _BOTH_WAYS or len(uses) != 2 for uses in users):
         raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
@@ -255,10 +254,10 @@ def _solids(shells: Sequence[TopoDS_Shell]) -> list[TopoDS_Solid]:
     return [solid for solid, _ in outer]
 
 
-def _images(fuse: BOPAlgo_Builder, face: TopoDS_Face) -> list[TopoDS_Face]:
+def _images(fuse: BOPAlgo_Builder, face: TopoDS_Shape) -> list[TopoDS_Face]:
     if fuse.IsDeleted(face):
         return []
-    return [TopoDS.Face_s(image) for image in fuse.Modified(face)] or [face]
+    return [TopoDS.Face_s(image) for image in fuse.Modified(face)] or [TopoDS.Face_s(face)]
 
 
 def _lies_in(face: TopoDS_Face, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:

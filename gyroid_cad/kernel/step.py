@@ -41,12 +41,15 @@ def require_schema(schema: str) -> str:
 
 
 def write_step(
-    shape: TopoDS_Shape, path: str | os.PathLike[str], schema: str = "ap214", name: str | None = None
+    shape: TopoDS_Shape,
+    path: str | os.PathLike[str],
+    schema: str = "ap214",
+    name: str | None = None,
+    parameter_curves: bool = False,
 ) -> None:
     """Write a shape in millimetres.
 
-    Curves in the parameter plane are left out: every edge of ours is a border line of its surface, which
-    readers find again at once. Points that faces and edges have in common are written once.
+    Points that faces and edges have in common are written once.
 
     Parameters
     ----------
@@ -56,6 +59,9 @@ def write_step(
     schema : {"ap214", "ap242"}
     name : str, optional
         Of the product; the file's stem if left out.
+    parameter_curves : bool
+        Whether to write curves in the parameter plane. Every edge of a lattice is a border line of its surface, which
+        readers find again at once; where faces are cut they are needed.
 
     Raises
     ------
@@ -69,7 +75,7 @@ def write_step(
         "write.step.schema": kernel_schema,
         "write.step.unit": "MM",
         "write.step.product.name": product,
-        "write.surfacecurve.mode": 0,
+        "write.surfacecurve.mode": int(parameter_curves),
     }
     # The first writer of a process registers the settings; the schema counts when a model is made.
     STEPControl_Writer()
@@ -96,7 +102,7 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     ExportError
         If the file is missing, not STEP, or holds no shape.
     """
-    with _silenced_messages():
+    with _no_messages():
         reader = STEPControl_Reader()
         if reader.ReadFile(str(path)) != IFSelect_RetDone:
             raise ExportError(f"{path} could not be read as STEP")
@@ -166,3 +172,17 @@ def _silenced_messages() -> Iterator[None]:
     finally:
         for printer, level in zip(printers, levels, strict=True):
             printer.SetTraceLevel(level)
+
+
+@contextmanager
+def _no_messages() -> Iterator[None]:
+    """Keep all that the kernel says to itself: what is wrong with a file is ours to tell."""
+    messenger = Message.DefaultMessenger_s()
+    printers = list(messenger.Printers())
+    try:
+        for printer in printers:
+            messenger.RemovePrinter(printer)
+        yield
+    finally:
+        for printer in printers:
+            messenger.AddPrinter(printer)

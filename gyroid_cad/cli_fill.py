@@ -1,0 +1,80 @@
+"""``gyroid-cad fill``: a part from a STEP file goes in, the same part filled with gyroid comes out."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gyroid_cad.tables import print_fill, shown_progress
+
+__all__ = ["fill_command"]
+
+
+@click.command("fill")
+@click.argument("part", metavar="PART.step")
+@click.option(
+    "-o", "--output", multiple=True, required=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated."
+)
+@click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
+@click.option("--thickness", type=float, metavar="MM", help="Whole wall, below 0.37647 of the cell size.")
+@click.option("--density", type=float, metavar="RHO", help="Volume fraction of the wall, or of the labyrinth, instead.")
+@click.option(
+    "--kind",
+    type=click.Choice(["sheet", "network-a", "network-b", "channels"]),
+    default="sheet",
+    show_default=True,
+    help="The wall, one of the two labyrinths it parts, or both of them without the wall.",
+)
+@click.option("--origin", nargs=3, type=float, default=(0, 0, 0), metavar="X Y Z", help="Of the lattice, in mm.")
+@click.option("--rotation", nargs=3, type=float, default=(0, 0, 0), metavar="A B C", help="About x, y, z, in degrees.")
+@click.option(
+    "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side."
+)
+@click.option("--drop-islands", is_flag=True, help="Leave out pieces cut off from the largest one.")
+@click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
+@click.option(
+    "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
+)
+@click.option("--deviation", type=float, metavar="MM", help="Of STL facets.")
+@click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between STL facets.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+def fill_command(
+    part: str,
+    output: tuple[str, ...],
+    control_points: int,
+    schema: str,
+    deviation: float | None,
+    angle: float,
+    as_json: bool,
+    quiet: bool,
+    **given: Any,
+) -> None:
+    """Fill the solids of a STEP file with gyroid and write what is left.
+
+    \b
+    gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
+    gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
+    """
+    start = time.perf_counter()
+    from gyroid_cad.build import require_formats, require_settings
+    from gyroid_cad.fill import fill
+    from gyroid_cad.fit import FitSettings
+
+    require_formats(output)
+    require_settings((1, 1, 1), schema, deviation, angle)
+    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
+        filled = fill(part, fit=FitSettings(control_points), progress=progress, **given)
+        filled.write(*output, schema=schema, deviation=deviation, angle=angle)
+    summary = filled.report.as_dict()
+    summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
+    summary["files"] = [{"path": path, "bytes": Path(path).stat().st_size} for path in output]
+    if as_json:
+        click.echo(json.dumps(summary))
+    elif not quiet:
+        print_fill(summary)

@@ -1,0 +1,180 @@
+"""Parts filled with gyroid: the wall, the labyrinths, what they weigh, and what is refused."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import build123d as bd
+import cadquery as cq
+import numpy as np
+import pytest
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopoDS import TopoDS_Shape
+from scipy.spatial.transform import Rotation
+
+import gyroid_cad.kernel.split
+from gyroid_cad.errors import ExportError, KernelError, ParameterError
+from gyroid_cad.fill import KINDS, Filled, _turn, fill, part_of
+from gyroid_cad.fit import FitSettings
+from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.part import measure, parts_of
+from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.tube import density_of_thickness, thickness_of_density
+
+CELL, WALL, RADIUS = 10.0, 0.9, 2.2
+BALL = 4 / 3 * np.pi * RADIUS**3
+COARSE = FitSettings(6)
+
+
+def ball(x: float = 5.0) -> cq.Workplane:
+    return cq.Workplane(origin=(x, 4.0, 6.0)).sphere(RADIUS)
+
+
+@lru_cache(maxsize=8)
+def filled(kind: str = "sheet", density: float | None = None) -> Filled:
+    wall = WALL if density is None else None
+    return fill(ball(), CELL, wall, density, kind, rotation=(10, 20, 30), fit=COARSE, material_density=2.7)
+
+
+@pytest.mark.parametrize(
+    ("kind", "density"), [("sheet", None), ("network-a", 0.4), ("network-b", 0.65), ("channels", None)]
+)
+def test_a_filled_part_is_closed_valid_and_what_its_report_says(kind: str, density: float | None) -> None:
+    made, report = filled(kind, density), filled(kind, density).report
+    assert is_valid(made.solid())
+    assert topology(made.solid()).closed
+    assert (topology(made.solid()).solids, topology(made.solid()).faces) == (report.solids, report.faces)
+    assert measure(made.solid()) == pytest.approx((report.volume, report.area), rel=1e-9)
+    assert report.part_volume == pytest.approx(BALL, rel=1e-6)
+    assert report.density == pytest.approx(report.volume / report.part_volume)
+    assert report.mass == pytest.approx(2.7e-3 * report.volume)
+    assert report.part_mass == pytest.approx(2.7e-3 * report.part_volume)
+
+
+def test_the_wall_and_the_channels_it_leaves_are_the_whole_part() -> None:
+    assert filled("sheet").report.volume + filled("channels").report.volume == pytest.approx(BALL, rel=1e-5)
+    assert set(filled("channels").domains) == {"channel-a", "channel-b"}
+
+
+def test_the_labyrinths_of_complementary_densities_are_the_whole_part() -> None:
+    # Where one begins at an offset, the other, of one less its density, ends.
+    both = [
+        fill(ball(), CELL, None, density, kind, fit=COARSE)
+        for kind, density in (("network-a", 0.3), ("network-b", 0.7))
+    ]
+    assert sum(made.report.volume for made in both) == pytest.approx(BALL, rel=1e-5)
+
+
+@pytest.mark.parametrize("density", [0.1, 0.3, 0.5, 0.7])
+def test_a_labyrinth_begins_where_half_of_space_less_half_a_wall_is_left(density: float) -> None:
+    from gyroid_cad.tube import offset_of_network
+
+    offset = offset_of_network(density)
+    assert 0.5 - np.sign(offset) * density_of_thickness(2 * abs(offset)) / 2 == pytest.approx(density, rel=1e-12)
+
+
+def test_a_box_of_one_period_is_as_dense_as_was_asked() -> None:
+    made = fill(cq.Workplane().box(CELL, CELL, CELL).translate((1, 2, 3)), CELL, density=0.25, origin=(0.3, 0.2, 0.1))
+    assert made.report.density == pytest.approx(0.25, rel=1e-4)
+    assert made.report.thickness == pytest.approx(thickness_of_density(0.25) * CELL)
+
+
+def test_moving_part_and_lattice_together_changes_nothing() -> None:
+    angles, shift = (30.0, -40.0, 50.0), (3.0, -2.0, 1.0)
+    moved = ball().val().moved(cq.Location(cq.Vector(*shift)) * cq.Location((0, 0, 0), (0, 0, 1), 0))
+    before, after = fill(ball(), CELL, WALL, fit=COARSE), fill(moved, CELL, WALL, origin=shift, fit=COARSE)
+    assert after.report.volume == pytest.approx(before.report.volume, rel=1e-7)
+    assert after.report.faces == before.report.faces
+    np.testing.assert_allclose(
+        _turn(np.array(angles)), Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), atol=1e-15
+    )
+
+
+def test_parts_of_any_host_and_of_files_are_the_same_part(tmp_path: Path) -> None:
+    shape, file = ball().val(), tmp_path / "ball.step"
+    write_step(shape.wrapped, file)
+    parts: list[Any] = [ball(), shape, shape.wrapped, bd.Solid(shape.wrapped), file, str(file)]
+    assert [part_of(part).volume for part in parts] == pytest.approx(len(parts) * [BALL], rel=1e-6)
+
+
+def test_islands_are_counted_and_dropped_on_request() -> None:
+    two = ball().add(ball(5.0 + 3 * RADIUS))
+    both, one = (fill(two, CELL, WALL, fit=COARSE, drop_islands=drop).report for drop in (False, True))
+    assert (both.islands, both.dropped) == (both.solids - 1, 0)
+    assert both.islands >= 1
+    assert (one.islands, one.dropped, one.solids) == (0, both.islands, 1)
+    assert one.volume < both.volume
+
+
+def test_files_are_written_and_read_back(tmp_path: Path) -> None:
+    filled().write(tmp_path / "light.step", tmp_path / "light.stl", deviation=0.1)
+    shape = read_step(tmp_path / "light.step")
+    assert is_valid(shape)
+    assert topology(shape).closed
+    assert measure(shape)[0] == pytest.approx(filled().report.volume, rel=1e-5)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["light.step", "light.stl"]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"part": 3}, "part = 3"),
+        ({"part": TopoDS_Shape()}, "an empty one"),
+        ({"part": next(parts_of(cq.Workplane().box(1, 1, 1).val().wrapped, TopAbs_FACE))}, "there is none in it"),
+        ({"cell_size": 0}, "cell_size = 0"),
+        ({"cell_size": float("nan")}, "cell_size = nan"),
+        ({"thickness": None}, "exactly one of the two"),
+        ({"density": 0.3}, "exactly one of the two"),
+        ({"thickness": 4.0}, "below 3.7647 mm"),
+        ({"kind": "truss"}, " or ".join(KINDS)),
+        ({"kind": "network-a"}, "the labyrinth's volume fraction"),
+        ({"kind": "network-a", "thickness": None, "density": 0.01}, "above 0.02983"),
+        ({"origin": (0, 0)}, "origin = (0, 0): expected three finite numbers"),
+        ({"rotation": 3}, "rotation = 3: expected three finite numbers"),
+        ({"material_density": -1}, "material_density = -1"),
+        ({"part": cq.Workplane().box(9, 9, 0.5)}, "less than the part's smallest extent, 0.5 mm"),
+    ],
+)
+def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], words: str) -> None:
+    arguments = {"part": ball(), "cell_size": CELL, "thickness": WALL, **given}
+    with pytest.raises(ParameterError) as caught:
+        fill(**arguments)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"not STEP at all", b"ISO-10303-21;\nHEADER;\nENDSEC;\n"])
+def test_a_file_that_is_no_part_is_an_error(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "part.step").write_bytes(content)
+    for path in (tmp_path / "part.step", tmp_path / "none.step"):
+        with pytest.raises(ExportError, match=r"part\.step|none\.step"):
+            fill(path, CELL, WALL)
+
+
+def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    split, calls = gyroid_cad.kernel.split.split, []
+
+    def failing_once(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 1:
+            raise KernelError("tangent")
+        return split(*arguments)
+
+    monkeypatch.setattr(gyroid_cad.kernel.split, "split", failing_once)
+    report = fill(ball(), CELL, WALL, fit=COARSE).report
+    assert len(calls) == 2
+    assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
+    assert report.valid
+
+
+@pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
+def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
+    solids = [ball().val().wrapped] if wrong == "the part itself" else []
+    monkeypatch.setattr(gyroid_cad.kernel.split, "split", lambda *arguments: None)
+    monkeypatch.setattr(gyroid_cad.kernel.split, "bounded_solids", lambda *arguments: solids)
+    with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
+        fill(ball(), CELL, WALL, fit=COARSE)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         smooth_minimum,
     )
     from gyroid_cad.fields import Field
-    from gyroid_cad.fill import Filled, FillReport, fill
+    from gyroid_cad.filling import Filled, FillReport, fill
     from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.maps import SpaceMap
@@ -84,7 +84,7 @@ _HOMES = {
         "smooth_maximum",
         "smooth_minimum",
     ),
-    "fill": ("FillReport", "Filled", "fill"),
+    "filling": ("FillReport", "Filled", "fill"),
     "fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
     "maps": ("SpaceMap",),

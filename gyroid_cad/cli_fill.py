@@ -63,7 +63,7 @@ def fill_command(
     """
     start = time.perf_counter()
     from gyroid_cad.build import require_formats, require_settings
-    from gyroid_cad.fill import fill
+    from gyroid_cad.filling import fill
     from gyroid_cad.fit import FitSettings
 
     require_formats(output)

@@ -50,7 +50,7 @@ ROWS = [
     ["kernel.split"],
     ["build"],
     ["paper", "limits", "report"],
-    ["fill"],
+    ["filling"],
     ["lattice"],
     ["__init__"],
     ["cq_plugin", "bd_objects", "progress", "config"],

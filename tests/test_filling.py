@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
-from gyroid_cad.fill import KINDS, Filled, _turn, fill, part_of
+from gyroid_cad.filling import KINDS, Filled, _turn, fill, part_of
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure, parts_of

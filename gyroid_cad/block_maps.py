@@ -44,9 +44,7 @@ class Cylinder:
     angle: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive_number("radius", self.radius, "a finite number of mm above 0"))
-        if self.angle is not None:
-            object.__setattr__(self, "angle", _turn(self.angle))
+        _check_round(self)
 
     def over(self, size: Size) -> SpaceMap:
         """The wrap of a block of this size, closed if it takes up the full turn.
@@ -91,9 +89,7 @@ class Sphere:
     angle: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", positive_number("radius", self.radius, "a finite number of mm above 0"))
-        if self.angle is not None:
-            object.__setattr__(self, "angle", _turn(self.angle))
+        _check_round(self)
 
     def over(self, size: Size) -> SpaceMap:
         """The patch of a sphere under a block of this size, closed if it takes up the whole equator.
@@ -306,6 +302,13 @@ def _round(block_map: Cylinder | Sphere, length: float) -> tuple[float, bool]:
             f"or angle={FULL_TURN:g} to close them round this one",
         )
     return 1 / block_map.radius, False
+
+
+def _check_round(block_map: Cylinder | Sphere) -> None:
+    radius = positive_number("radius", block_map.radius, "a finite number of mm above 0")
+    object.__setattr__(block_map, "radius", radius)
+    if block_map.angle is not None:
+        object.__setattr__(block_map, "angle", _turn(block_map.angle))
 
 
 def _turn(angle: object) -> float:

@@ -33,7 +33,7 @@ __all__ = [
     "build",
     "require_formats",
     "require_settings",
-    "tell",
+    "timed",
     "write_shape",
 ]
 
@@ -135,11 +135,8 @@ class Build:
     @contextmanager
     def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
         """Tell that a stage begins and ends, and add the seconds between."""
-        start = time.perf_counter()
-        tell(progress, stage, 0, 1)
-        yield
-        tell(progress, stage, 1, 1)
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+        with timed(self.seconds, stage, progress):
+            yield
 
     @cached_property
     def bounding_box(self) -> tuple[list[float], list[float]]:
@@ -305,6 +302,16 @@ def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int, control_po
             f"at most about {most} cells in all: these take about {needed / 1e9:.3g} GB of memory "
             f"and {available / 1e9:.3g} GB are free",
         )
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str, progress: Progress | None) -> Iterator[None]:
+    """Tell that a stage begins and ends, and add the seconds between to those of the stage."""
+    start = time.perf_counter()
+    tell(progress, stage, 0, 1)
+    yield
+    tell(progress, stage, 1, 1)
+    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
 
 
 def tell(progress: Progress | None, stage: str, done: int, total: int) -> None:

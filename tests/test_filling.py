@@ -18,8 +18,8 @@ import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.filling import KINDS, Filled, _turn, fill, part_of
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.kernel.check import is_valid, topology
-from gyroid_cad.kernel.part import measure, parts_of
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.tube import density_of_thickness, thickness_of_density
 

@@ -28,7 +28,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs import NurbsSurface, grid_derivatives
 
-__all__ = ["Topology", "enclosed_volume", "is_valid", "topology"]
+__all__ = ["Topology", "enclosed_volume", "is_valid", "parts_of", "topology"]
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def topology(shape: TopoDS_Shape) -> Topology:
     edges = TopTools_IndexedMapOfShape()
     uses: dict[tuple[int, TopAbs_Orientation], int] = {}
     # The explorer visits an edge once for each face it bounds, oriented as that face uses it.
-    for edge in _parts(shape, TopAbs_EDGE):
+    for edge in parts_of(shape, TopAbs_EDGE):
         # An edge shrunk to a point, as at the pole of a sphere, bounds one face only.
         if BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
             continue
@@ -69,8 +69,8 @@ def topology(shape: TopoDS_Shape) -> Topology:
         uses[use] = uses.get(use, 0) + 1
     both = ((uses.get((i, TopAbs_FORWARD)), uses.get((i, TopAbs_REVERSED))) for i in range(1, edges.Extent() + 1))
     return Topology(
-        solids=sum(1 for _ in _parts(shape, TopAbs_SOLID)),
-        faces=sum(1 for _ in _parts(shape, TopAbs_FACE)),
+        solids=sum(1 for _ in parts_of(shape, TopAbs_SOLID)),
+        faces=sum(1 for _ in parts_of(shape, TopAbs_FACE)),
         open_edges=sum(pair != (1, 1) for pair in both),
     )
 
@@ -99,7 +99,7 @@ def enclosed_volume(shape: TopoDS_Shape) -> float:
     """
     surfaces: dict[int, Geom_BSplineSurface] = {}
     uses = []
-    for part in _parts(shape, TopAbs_FACE):
+    for part in parts_of(shape, TopAbs_FACE):
         face = TopoDS.Face_s(part)
         location = TopLoc_Location()
         surface = BRep_Tool.Surface_s(face, location)
@@ -147,7 +147,8 @@ def _placed_flux(flux: float, area: Floats, location: TopLoc_Location) -> float:
     return float(determinant * flux + shift @ cofactors @ area / 3)
 
 
-def _parts(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
+    """The faces, edges or solids of a shape, one for each time it is used."""
     explorer = TopExp_Explorer(shape, kind)
     while explorer.More():
         yield explorer.Current()

@@ -17,15 +17,14 @@ from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
-from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_ShapeEnum, TopAbs_SOLID
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
 
-__all__ = ["Part", "measure", "parts_of", "require_part"]
+__all__ = ["Part", "measure", "require_part"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -97,24 +96,25 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     if shape is None or shape.IsNull():
         raise ParameterError(parameter, shape, "a shape that holds a solid, not an empty one")
     solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(shape, TopAbs_SOLID))
-    if not solids:
-        kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
-        raise ParameterError(parameter, kind, "a closed solid: there is none in it")
     kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
+    if not solids:
+        raise ParameterError(parameter, kind, "a closed solid: there is none in it")
+    volumes = []
     for index, solid in enumerate(solids, 1):
         which = "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"
         if open_edges := topology(solid).open_edges:
             raise ParameterError(parameter, kind, f"a closed solid: {which} has {open_edges} open edges")
         if not is_valid(solid):
             raise ParameterError(parameter, kind, f"a valid solid: the kernel finds fault with {which}")
-        if not measure(solid)[0] > 0:
+        volumes.append(measure(solid)[0])
+        if not volumes[-1] > 0:
             raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, box, False, False)
     corners = np.array(box.Get())
     divided = _without_seams(shape)
     solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, corners[:3], corners[3:], sum(measure(solid)[0] for solid in solids))
+    return Part(divided, solids, corners[:3], corners[3:], sum(volumes))
 
 
 def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
@@ -134,14 +134,6 @@ def measure(shape: TopoDS_Shape) -> tuple[float, float]:
     BRepGProp.VolumeProperties_s(shape, volume)
     BRepGProp.SurfaceProperties_s(shape, area)
     return float(volume.Mass()), float(area.Mass())
-
-
-def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
-    """The faces, edges or solids of a shape, one for each time it is used."""
-    explorer = TopExp_Explorer(shape, kind)
-    while explorer.More():
-        yield explorer.Current()
-        explorer.Next()
 
 
 def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:

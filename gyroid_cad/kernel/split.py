@@ -32,7 +32,8 @@ from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoD
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.part import Part, parts_of
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.part import Part
 
 __all__ = ["Pieces", "bounded_solids", "compound_of", "split"]
 

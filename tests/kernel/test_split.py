@@ -18,8 +18,8 @@ from gyroid_cad.complex import build_complex
 from gyroid_cad.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
 from gyroid_cad.errors import KernelError
 from gyroid_cad.fit import FitSettings, fit_patch
-from gyroid_cad.kernel.check import is_valid, topology
-from gyroid_cad.kernel.part import measure, parts_of, require_part
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.part import measure, require_part
 from gyroid_cad.kernel.solid import realise, realise_faces
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
 from gyroid_cad.wall import build_wall

@@ -11,9 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
-from OCP.Geom2d import Geom2d_Line
-from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
+from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
@@ -28,7 +26,8 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
-from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface
+from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry, parameter_line
+from gyroid_cad.kernel.surfaces import kernel_curve
 from gyroid_cad.nurbs import NurbsCurve
 from gyroid_cad.wall import SIDES, Wall
 
@@ -36,8 +35,6 @@ __all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise", "realise_fac
 
 KernelShape = TopoDS_Shape
 
-# The kernel's own smallest distance (Precision::Confusion): shared edges agree to rounding.
-TOLERANCE = 1e-7
 # Where the patch's corners are in its control net.
 _CORNER_INDEX = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 
@@ -88,19 +85,12 @@ class _Realisation:
         self.complex = wall.complex
         self.builder = BRep_Builder()
         self.identity = TopLoc_Location()
-        # One location object a translation: the kernel compares locations by how they were made.
-        self.locations = [_translation(shift) for shift in wall.shifts.tolist()]
-        self.face_surfaces: dict[tuple[int, int], Geom_BSplineSurface] = {}
-        self.ruled_surfaces: dict[tuple[int, int], Geom_BSplineSurface] = {}
-        self.curves: dict[tuple[int, int, int], Geom_BSplineCurve] = {}
-        self.patch_net = wall.patch_net.tolist()
-        self.patch_shift = wall.patch_shift.tolist()
+        self.geometry = WallGeometry(wall)
         self.patch_edges = self.complex.patch_edges.tolist()
         self.patch_fans = self.complex.patch_fans.tolist()
         self.edge_forward = self.complex.edge_forward.tolist()
-        self.border = _border_lines()
-        self.rim_lines = [(_line(0, height, -1, 0), _line(0, height, 1, 0)) for height in (0, 1)]
-        self.post_lines = [_line(u, 0, 0, 1) for u in (-1, 1)]
+        self.rim_lines = [(parameter_line(0, height, -1, 0), parameter_line(0, height, 1, 0)) for height in (0, 1)]
+        self.post_lines = [parameter_line(u, 0, 0, 1) for u in (-1, 1)]
 
     def build(self, progress: Callable[[int, int], None]) -> TopoDS_Shape:
         self.vertices = self._make_vertices()
@@ -176,9 +166,8 @@ class _Realisation:
             made = []
             for index, patch in enumerate(owner):
                 k = self.patch_edges[patch].index(index)
-                curve = self._curve(patch, k, side)
                 edge = TopoDS_Edge()
-                self.builder.MakeEdge(edge, curve, self.locations[self.patch_shift[patch]], TOLERANCE)
+                self.builder.MakeEdge(edge, self.geometry.rim(patch, k, side), self.geometry.location(patch), TOLERANCE)
                 start, end = fans[index]
                 self._bound(edge, self.vertices[side][start], self.vertices[side][end], -1.0, 1.0)
                 made.append(edge)
@@ -203,33 +192,19 @@ class _Realisation:
         self.builder.Add(edge, end.Oriented(TopAbs_REVERSED))
         self.builder.Range(edge, first, last)
 
-    def _curve(self, patch: int, k: int, side: int) -> Geom_BSplineCurve:
-        key = (self.patch_net[patch] * 4 + k, side, self.edge_forward[patch][k])
-        if key not in self.curves:
-            curve = self.wall.face(self.patch_net[patch], side).edge(k)
-            self.curves[key] = kernel_curve(curve if self.edge_forward[patch][k] else curve.reversed())
-        return self.curves[key]
-
     def _make_face(self, patch: int, side: int) -> TopoDS_Face:
-        key = (self.patch_net[patch], side)
-        if key not in self.face_surfaces:
-            self.face_surfaces[key] = kernel_surface(self.wall.face(*key))
-        surface, location = self.face_surfaces[key], self.locations[self.patch_shift[patch]]
+        surface, location = self.geometry.face(patch, side), self.geometry.location(patch)
         face, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(face, surface, location, TOLERANCE)
         self.builder.MakeWire(wire)
         for k, index in enumerate(self.patch_edges[patch]):
             edge = self.edges[side][index]
-            forward = self.edge_forward[patch][k]
-            self.builder.UpdateEdge(edge, self.border[k][forward], surface, location, TOLERANCE)
-            self.builder.Add(wire, edge if forward else edge.Reversed())
+            self.builder.UpdateEdge(edge, self.geometry.border(patch, k), surface, location, TOLERANCE)
+            self.builder.Add(wire, edge if self.edge_forward[patch][k] else edge.Reversed())
         return self._closed(face, wire)
 
     def _make_side_wall(self, patch: int, k: int) -> TopoDS_Face:
-        key = (self.patch_net[patch], k)
-        if key not in self.ruled_surfaces:
-            self.ruled_surfaces[key] = kernel_surface(self.wall.side_wall(*key))
-        surface, location = self.ruled_surfaces[key], self.locations[self.patch_shift[patch]]
+        surface, location = self.geometry.side_wall(patch, k), self.geometry.location(patch)
         face, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(face, surface, location, TOLERANCE)
         self.builder.MakeWire(wire)
@@ -254,25 +229,6 @@ class _Realisation:
         return face
 
 
-def _border_lines() -> list[tuple[Geom2d_Line, Geom2d_Line]]:
-    """The square's four sides in the parameter plane, for edges that run against and along the patch."""
-    starts = ((0, -1), (1, 0), (0, 1), (-1, 0))
-    directions = ((1, 0), (0, 1), (-1, 0), (0, -1))
-    return [
-        (_line(*start, -du, -dv), _line(*start, du, dv)) for start, (du, dv) in zip(starts, directions, strict=True)
-    ]
-
-
-def _line(u: float, v: float, du: float, dv: float) -> Geom2d_Line:
-    return Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(du, dv))
-
-
 def _position(vertex: TopoDS_Vertex) -> tuple[float, float, float]:
     point = BRep_Tool.Pnt_s(vertex)
     return point.X(), point.Y(), point.Z()
-
-
-def _translation(shift: list[float]) -> TopLoc_Location:
-    transformation = gp_Trsf()
-    transformation.SetTranslation(gp_Vec(*shift))
-    return TopLoc_Location(transformation)

@@ -13,14 +13,14 @@ from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_A
 
 from gyroid_cad.nurbs import NurbsCurve, NurbsSurface
 
-__all__ = ["kernel_curve", "kernel_surface", "nurbs_of_surface"]
+__all__ = ["kernel_curve", "kernel_knots", "kernel_surface", "nurbs_of_surface"]
 
 Floats = NDArray[np.float64]
 
 
 def kernel_curve(curve: NurbsCurve) -> Geom_BSplineCurve:
     """The curve as a ``Geom_BSplineCurve``, rational only if its weights differ."""
-    knots, multiplicities = _knots(curve.knots)
+    knots, multiplicities = kernel_knots(curve.knots)
     poles = TColgp_Array1OfPnt(1, len(curve.control_points))
     for i, point in enumerate(curve.control_points.tolist(), 1):
         poles.SetValue(i, gp_Pnt(*point))
@@ -36,8 +36,8 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
     for i, row in enumerate(surface.control_points.tolist(), 1):
         for j, point in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(*point))
-    knots_u, multiplicities_u = _knots(surface.knots_u)
-    knots_v, multiplicities_v = _knots(surface.knots_v)
+    knots_u, multiplicities_u = kernel_knots(surface.knots_u)
+    knots_v, multiplicities_v = kernel_knots(surface.knots_v)
     rest = (knots_u, knots_v, multiplicities_u, multiplicities_v, surface.degree_u, surface.degree_v)
     if not surface.rational:
         return Geom_BSplineSurface(poles, *rest)
@@ -65,7 +65,8 @@ def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
     return NurbsSurface(points, np.array(weights), knots_u, knots_v)
 
 
-def _knots(vector: Floats) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+def kernel_knots(vector: Floats) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+    """Distinct knots and their multiplicities."""
     return _knot_arrays(tuple(vector.tolist()))
 
 

@@ -1,0 +1,445 @@
+"""Faces of the wall cut to a box: what is left of each, as loops of arcs in the parameter square.
+
+The square's sides and the section curves are parted where they meet. An arc is kept if its middle lies in the box; each
+kept arc runs with what is wanted on its left, so every place has one arc that ends and one that begins, and the arcs
+link up to loops by themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.nurbs import grid_derivatives
+from gyroid_cad.sections import PLANES, Faces, Rims, Sections, plane_sections, rim_crossings, square_points
+
+__all__ = ["Arc", "CutFace", "Node", "Piece", "SquareQuadrature", "cut_faces"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+CORNER, RIM, BOX = "corner", "rim", "box"
+# ("corner", k); ("rim", side, how many before it); ("box", index of the node, 0)
+Node = tuple[str, int, int]
+
+_CHUNK = 64
+_NEWTON_STEPS = 6
+# Quadrature points a stretch between two stations of a section curve.
+_PER_STRETCH = 3
+_RIM_PIECES = 8
+# Between places in the square found by two curves: their own closeness, and far from that of two crossings.
+_SAME_PLACE = 1e-4
+_OUTLINE = np.linspace(0, 1, 7)
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A stretch of the square's side, or of a section curve.
+
+    Attributes
+    ----------
+    side : int
+        Of the square; -1 if the arc is one of a section curve.
+    curve : int
+        Of the face's section curves; -1 if the arc is one of a side.
+    stretch, stretches : int
+        Which stretch of the side or curve, of how many.
+    first, last : float
+        Its parameters there.
+    start, end : Node
+    """
+
+    side: int
+    curve: int
+    stretch: int
+    stretches: int
+    first: float
+    last: float
+    start: Node
+    end: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """One connected remainder of a face.
+
+    Attributes
+    ----------
+    loops : list of list of Arc
+        The outer one first, what is left of the face on their left.
+    flux : float
+        Of p / 3 through it, in mm3.
+    area_vector : ndarray, shape (3,)
+        In mm2.
+    area : float
+        In mm2.
+    """
+
+    loops: list[list[Arc]]
+    flux: float
+    area_vector: Floats
+    area: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutFace:
+    """What a box leaves of a face.
+
+    Attributes
+    ----------
+    pieces : list of Piece
+    sections : Sections
+        Holds the section curves of this face and of others.
+    curves : list of int
+        This face's, of all the section curves; an arc's ``curve`` is an index into this list.
+    crossings : list of int
+        How many times each side of the square crosses a plane.
+    points : dict
+        Of the nodes that are no corners, in mm along the box's axes.
+    edges : dict
+        Which two planes meet at a node on an edge of the box.
+    outlines : dict
+        Points along the arcs of section curves, in mm; shape (k, 3).
+    """
+
+    pieces: list[Piece]
+    sections: Sections
+    curves: list[int]
+    crossings: list[int]
+    points: dict[Node, Floats]
+    edges: dict[Node, tuple[int, int]]
+    outlines: dict[Arc, Floats]
+
+    def plane(self, arc: Arc) -> int:
+        """The plane that an arc of a section curve lies in."""
+        return int(self.sections.plane[self.curves[arc.curve]])
+
+    def on_edge(self, node: Node, plane: int) -> bool:
+        """Whether a node lies on an edge of the box that is one of a plane's."""
+        return plane in self.edges.get(node, ())
+
+    def bulge(self, arc: Arc, x: int, y: int) -> float:
+        """Area between an arc of a section curve and its chord, seen along two axes, in mm2; positive to its right."""
+        curve = self.curves[arc.curve]
+        t, weights = _composite(arc.first, arc.last, len(self.sections.points[curve]))
+        place, rate = (self.sections.in_space(curve, t, k)[:, [x, y]] for k in (0, 1))
+        ends = self.sections.in_space(curve, np.array([arc.first, arc.last]))[:, [x, y]]
+        place = place - ends[0]
+        return float(weights @ (place[:, 0] * rate[:, 1] - place[:, 1] * rate[:, 0])) / 2
+
+
+def cut_faces(faces: Faces, size: float) -> list[CutFace]:
+    """Cut faces to a box.
+
+    Parameters
+    ----------
+    faces : Faces
+    size : float
+        Of a cell, in mm.
+
+    Returns
+    -------
+    list of CutFace
+        One a face; without pieces where the face lies outside.
+
+    Raises
+    ------
+    KernelError
+        If a face touches a plane of the box, so that it is in doubt what to keep.
+    """
+    cut = []
+    for first in range(0, len(faces), _CHUNK):
+        chunk = faces.chunk(first, _CHUNK)
+        rims = rim_crossings(chunk)
+        cut += _Cutting(chunk, rims, plane_sections(chunk, rims, size)).run()
+    return cut
+
+
+class _Cutting:
+    """Some faces, where their sides cross the planes, and their section curves."""
+
+    def __init__(self, faces: Faces, rims: Rims, sections: Sections) -> None:
+        self.faces, self.rims, self.sections = faces, rims, sections
+        self.curves: list[list[int]] = [[] for _ in range(len(faces))]
+        for curve, face in enumerate(sections.face.tolist()):
+            self.curves[face].append(curve)
+        self.crossings: list[list[int]] = [[] for _ in range(len(faces))]
+        for crossing, face in enumerate(rims.face.tolist()):
+            self.crossings[face].append(crossing)
+
+    def run(self) -> list[CutFace]:
+        quadrature = SquareQuadrature(self.faces.knots)
+        densities = quadrature.densities(self.faces.nets, self.faces.weights)
+        cut = []
+        for face, curves in enumerate(self.curves):
+            points, edges, on_curves = self._edge_points(curves)
+            arcs = self._arcs(face, curves, on_curves)
+            kept = [arc for arc, keep in zip(arcs, self._in_box(face, curves, arcs), strict=True) if keep]
+            pieces = [
+                self._measured(curves, loops, quadrature, densities[face]) for loops in self._pieces(curves, kept)
+            ]
+            crossings = np.bincount(self.rims.side[self.crossings[face]], minlength=4).tolist()
+            for arc in kept:
+                if arc.curve >= 0:
+                    # Ends that are none on an edge of the box are the curve's own.
+                    for node, end in ((arc.start, 0), (arc.end, -1)):
+                        points.setdefault(node, self.sections.points[curves[arc.curve]][end])
+            outlines = {arc: self._in_space(curves, arc) for arc in kept if arc.curve >= 0}
+            cut.append(CutFace(pieces, self.sections, curves, crossings, points, edges, outlines))
+        return cut
+
+    def _edge_points(
+        self, curves: list[int]
+    ) -> tuple[dict[Node, Floats], dict[Node, tuple[int, int]], list[list[tuple[float, int]]]]:
+        """Where section curves of one face cross each other, on an edge of the box.
+
+        Their points; the planes that meet there; and for each curve the parameters and numbers of those on it.
+        """
+        points: dict[Node, Floats] = {}
+        edges: dict[Node, tuple[int, int]] = {}
+        places: list[Floats] = []
+        on_curves: list[list[tuple[float, int]]] = [[] for _ in curves]
+        for index, curve in enumerate(curves):
+            plane = int(self.sections.plane[curve])
+            others = [other for other, (axis, _) in enumerate(PLANES) if axis != PLANES[plane][0]]
+            for other, t in [(one, t) for one in others for t in self._crossings_of(curve, one)]:
+                pair = (min(plane, other), max(plane, other))
+                place = self.sections.in_square(curve, np.array([t]))[0]
+                number = self._number_near(place, places, [edges[BOX, k, 0] == pair for k in range(len(places))])
+                if number == len(places):
+                    places.append(place)
+                    point = self.sections.in_space(curve, np.array([t]))[0]
+                    for one in pair:
+                        point[PLANES[one][0]] = self._level(curve, one)
+                    points[BOX, number, 0], edges[BOX, number, 0] = point, pair
+                on_curves[index].append((t, number))
+        return points, edges, [sorted(crossings) for crossings in on_curves]
+
+    @staticmethod
+    def _number_near(place: Floats, places: list[Floats], alike: list[bool]) -> int:
+        """Which of the places a place is, found a second time from the other curve through it; or a new number."""
+        for number, (other, same) in enumerate(zip(places, alike, strict=True)):
+            if same and np.linalg.norm(other - place) < _SAME_PLACE:
+                return number
+        return len(places)
+
+    def _level(self, curve: int, plane: int) -> float:
+        return float(self.faces.levels[self.sections.face[curve], plane])
+
+    def _crossings_of(self, curve: int, plane: int) -> list[float]:
+        """Parameters at which a section curve crosses another plane."""
+        level, axis = self._level(curve, plane), PLANES[plane][0]
+        if np.isnan(level):
+            return []
+        t = np.linspace(0, 1, 4 * len(self.sections.points[curve]))
+        height = self.sections.in_space(curve, t)[:, axis] - level
+        before = np.flatnonzero((height[1:] > 0) != (height[:-1] > 0))
+        low, high = t[before], t[before + 1]
+        root = low + (high - low) * height[before] / (height[before] - height[before + 1])
+        for _ in range(_NEWTON_STEPS):
+            miss = self.sections.in_space(curve, root)[:, axis] - level
+            root = np.clip(root - miss / self.sections.in_space(curve, root, 1)[:, axis], low, high)
+        return [float(value) for value in root]
+
+    def _arcs(self, face: int, curves: list[int], on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
+        """All stretches of the square's sides and of the section curves, between the places where they meet."""
+        arcs = []
+        node_of: dict[int, Node] = {}
+        for side in range(4):
+            crossings = [k for k in self.crossings[face] if self.rims.side[k] == side]
+            node_of |= {k: (RIM, side, before) for before, k in enumerate(crossings)}
+            stops = [-1.0, *self.rims.along[crossings].tolist(), 1.0]
+            nodes: list[Node] = [
+                (CORNER, side, 0),
+                *(node_of[k] for k in crossings),
+                (CORNER, (side + 1) % 4, 0),
+            ]
+            arcs += _stretches(side, -1, stops, nodes)
+        for index, curve in enumerate(curves):
+            stops = [0.0, *(t for t, _ in on_curves[index]), 1.0]
+            ends = node_of[int(self.sections.start[curve])], node_of[int(self.sections.end[curve])]
+            nodes = [ends[0], *((BOX, k, 0) for _, k in on_curves[index]), ends[1]]
+            arcs += _stretches(-1, index, stops, nodes)
+        return arcs
+
+    def _in_box(self, face: int, curves: list[int], arcs: list[Arc]) -> list[bool]:
+        middles = np.array([self._places(curves, arc, np.array([(arc.first + arc.last) / 2]))[0] for arc in arcs])
+        heights = self.faces.heights(np.array([face]), middles[np.newaxis, :, 0], middles[np.newaxis, :, 1])[0]
+        for index, arc in enumerate(arcs):
+            if arc.curve >= 0:
+                heights[index, self.sections.plane[curves[arc.curve]]] = np.inf
+        return [bool(keep) for keep in np.all(heights > 0, axis=1)]
+
+    def _places(self, curves: list[int], arc: Arc, t: Floats) -> Floats:
+        if arc.curve >= 0:
+            return self.sections.in_square(curves[arc.curve], t)
+        return np.stack(square_points(arc.side, t), axis=-1)
+
+    def _in_space(self, curves: list[int], arc: Arc) -> Floats:
+        return self.sections.in_space(curves[arc.curve], arc.first + (arc.last - arc.first) * _OUTLINE)
+
+    def _pieces(self, curves: list[int], kept: list[Arc]) -> list[list[list[Arc]]]:
+        """Loops of arcs, holes with the loop round them."""
+        loops = linked(kept)
+        outlines = [self._outline(curves, loop) for loop in loops]
+        return [[loops[index] for index in group] for group in nested(outlines)]
+
+    def _outline(self, curves: list[int], loop: list[Arc]) -> Floats:
+        fractions = np.linspace(0, 1, 9)[:-1]
+        return np.concatenate(
+            [self._places(curves, arc, arc.first + (arc.last - arc.first) * fractions) for arc in loop]
+        )
+
+    def _measured(
+        self, curves: list[int], loops: list[list[Arc]], quadrature: SquareQuadrature, density: Floats
+    ) -> Piece:
+        places, rates = [np.zeros((0, 2))], [np.zeros(0)]
+        for arc in (arc for loop in loops for arc in loop):
+            # By Green's theorem, with an antiderivative along u that is 0 at u = -1: the other sides add nothing.
+            if arc.side in (0, 2, 3):
+                continue
+            count = _RIM_PIECES if arc.curve < 0 else len(self.sections.points[curves[arc.curve]])
+            t, weights = _composite(arc.first, arc.last, count)
+            places.append(self._places(curves, arc, t))
+            rate = 1.0 if arc.curve < 0 else self.sections.in_square(curves[arc.curve], t, 1)[:, 1]
+            rates.append(weights * rate)
+        total = quadrature.over(np.concatenate(places), np.concatenate(rates), density)
+        return Piece(loops, float(total[0]), total[1:4], float(total[4]))
+
+
+class SquareQuadrature:
+    """Integrals over part of the parameter square, of functions sampled once on the whole of it.
+
+    Parameters
+    ----------
+    knots : ndarray
+        Between which the functions are smooth, along u and v.
+    """
+
+    _PER_SPAN = 9
+
+    def __init__(self, knots: Floats) -> None:
+        self.breaks = np.unique(knots)
+        self.nodes, self.weights = np.polynomial.legendre.leggauss(self._PER_SPAN)
+        half = np.diff(self.breaks)[:, np.newaxis] / 2
+        self.places = (self.breaks[:-1, np.newaxis] + half * (1 + self.nodes)).ravel()
+        self.knots = knots
+
+    def densities(self, nets: Floats, weights: Floats) -> Floats:
+        """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, nodes, nodes, 5)."""
+        points, du, dv = grid_derivatives(nets, weights, (self.knots, self.knots), self.places, self.places)
+        across = np.cross(du, dv)
+        flux = np.sum(points * across, axis=-1, keepdims=True) / 3
+        return np.concatenate([flux, across, np.linalg.norm(across, axis=-1, keepdims=True)], axis=-1)
+
+    def over_square(self, nets: Floats, weights: Floats) -> Floats:
+        """Integrals over whole faces; shape (faces, 5)."""
+        along = (np.diff(self.breaks)[:, np.newaxis] / 2 * self.weights).ravel()
+        chunks = [nets[first : first + _CHUNK] for first in range(0, len(nets), _CHUNK)]
+        sums = [
+            np.einsum("u,v,fuvk->fk", along, along, self.densities(chunk, weights), optimize=True) for chunk in chunks
+        ]
+        return np.concatenate(sums) if sums else np.zeros((0, 5))
+
+    def over(self, places: Floats, rates: Floats, density: Floats) -> Floats:
+        """Sum of rates times the integral of a density along u, from -1 to each place; shape (5,)."""
+        along_u, along_v = self._functions(places[:, 0])[1], self._functions(places[:, 1])[0]
+        return np.asarray(np.einsum("uv,uvk->k", along_u.T @ (along_v * rates[:, np.newaxis]), density))
+
+    def _functions(self, x: Floats) -> tuple[Floats, Floats]:
+        """Lagrange polynomials on the spans' Gauss points at x, and their integrals from -1 to x."""
+        spans, p = len(self.breaks) - 1, self._PER_SPAN
+        span = np.clip(np.searchsorted(self.breaks, x, side="right") - 1, 0, spans - 1)
+        half = np.diff(self.breaks) / 2
+        local = (x - self.breaks[span]) / half[span] - 1
+        legendre = np.polynomial.legendre.legvander(local, p)
+        order = np.arange(p)
+        at_nodes = (
+            np.polynomial.legendre.legvander(self.nodes, p - 1) * (2 * order + 1) / 2 * self.weights[:, np.newaxis]
+        )
+        integrals = np.empty_like(legendre[:, :p])
+        integrals[:, 0] = local + 1
+        integrals[:, 1:] = (legendre[:, 2:] - legendre[:, :-2]) / (2 * order[1:] + 1)
+        rows = np.arange(len(x))
+        values, sums = np.zeros((len(x), spans, p)), np.zeros((len(x), spans, p))
+        values[rows, span] = legendre[:, :p] @ at_nodes.T
+        sums[:] = np.where(np.arange(spans) < span[:, np.newaxis], half, 0.0)[..., np.newaxis] * self.weights
+        sums[rows, span] = (integrals @ at_nodes.T) * half[span, np.newaxis]
+        return values.reshape(len(x), -1), sums.reshape(len(x), -1)
+
+
+def linked(arcs: list[Arc]) -> list[list[Arc]]:
+    """Arcs as closed loops.
+
+    Raises
+    ------
+    KernelError
+        If arcs do not link up one for one.
+    """
+    onward = {arc.start: arc for arc in arcs}
+    if len(onward) < len(arcs) or onward.keys() != {arc.end for arc in arcs}:
+        raise KernelError("what the box leaves of a face of the lattice does not close")
+    loops = []
+    while onward:
+        loop = [onward.pop(next(iter(onward)))]
+        while loop[-1].end != loop[0].start:
+            loop.append(onward.pop(loop[-1].end))
+        loops.append(loop)
+    return loops
+
+
+def nested(outlines: list[Floats]) -> list[list[int]]:
+    """Outlines (k, 2) that run round what they bound, each with those of its holes.
+
+    Raises
+    ------
+    KernelError
+        If a hole lies in nothing.
+    """
+    areas = np.array([signed_area(outline) for outline in outlines])
+    groups = {index: [index] for index in np.flatnonzero(areas > 0).tolist()}
+    for hole in np.flatnonzero(areas <= 0).tolist():
+        around = [index for index in groups if holds(outlines[index], outlines[hole][0])]
+        if not around:
+            raise KernelError("a hole in a face that the box has cut lies in none of its pieces")
+        groups[min(around, key=lambda index: float(areas[index]))].append(hole)
+    return list(groups.values())
+
+
+def signed_area(outline: Floats) -> float:
+    """Area in a polygon, shape (k, 2), that runs anticlockwise."""
+    x, y = outline.T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
+
+
+def holds(outline: Floats, place: Floats) -> bool:
+    """Whether a place, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
+    x, y = (outline - place).T
+    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
+    crosses = (y > 0) != (next_y > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond = x - y * (next_x - x) / (next_y - y) > 0
+    return bool(np.sum(crosses & beyond) % 2)
+
+
+def _stretches(side: int, curve: int, stops: list[float], nodes: list[Node]) -> list[Arc]:
+    count = len(stops) - 1
+    return [Arc(side, curve, k, count, stops[k], stops[k + 1], nodes[k], nodes[k + 1]) for k in range(count)]
+
+
+def _composite(first: float, last: float, pieces: int) -> tuple[Floats, Floats]:
+    """Gauss-Legendre points and weights on equal pieces of an interval."""
+    nodes, weights = _rule()
+    half = (last - first) / pieces / 2
+    middles = first + half * (2 * np.arange(pieces) + 1)
+    return (middles[:, np.newaxis] + half * nodes).ravel(), np.tile(half * weights, pieces)
+
+
+@lru_cache
+def _rule() -> tuple[Floats, Floats]:
+    nodes, weights = np.polynomial.legendre.leggauss(_PER_STRETCH)
+    return nodes, weights

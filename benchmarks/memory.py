@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.timing import fresh_python, plain_table
 
-__all__ = ["main"]
+__all__ = ["main", "peak"]
 
 _KINDS = ("solid", "step", "stl")
 # Linux's own record of this program's peak: ru_maxrss starts there from the peak of the process that started it.
@@ -75,10 +75,10 @@ def _alone(kind: str, side: int) -> None:
             write_stl(solid, path, CELL_SIZE / 1000)
         if path.exists():
             size = path.stat().st_size
-    print(_peak(), size)
+    print(peak(), size)
 
 
-def _peak() -> int:
+def peak() -> int:
     """Peak resident memory of this process, in bytes."""
     if _STATUS.exists():
         lines = (line.split() for line in _STATUS.read_text().splitlines())

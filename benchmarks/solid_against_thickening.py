@@ -38,7 +38,7 @@ from gyroid_cad.kernel.surfaces import kernel_surface
 from gyroid_cad.symmetry import QUARTER, cubic_cell
 from gyroid_cad.tube import density_of_thickness
 
-__all__ = ["main"]
+__all__ = ["copies", "main", "thickened"]
 
 _PARAMETER_CURVES = "write.surfacecurve.mode"
 _HEADINGS = ("", "processor time", "faces", "open", "valid", "volume off by", "our STEP", "kernel's", "default")
@@ -51,8 +51,8 @@ def main(arguments: Sequence[str] = ()) -> bool:
     (ours, solid), (theirs, thickened), (sewing, shell) = best_in_turn(
         options.repeats,
         lambda: block_solid(options.cells),
-        lambda: _thickened(sewn(_copies(options.cells))),
-        lambda: sewn(_copies(options.cells)),
+        lambda: thickened(sewn(copies(options.cells))),
+        lambda: sewn(copies(options.cells)),
     )
     sizes = [_step_bytes(shape) for shape in (solid, thickened)]
     our_step, (_, kernel_step, default_step) = sizes[0][0], sizes[1]
@@ -87,7 +87,7 @@ def _figures(seconds: float, shape: TopoDS_Shape, cells: int) -> tuple[str, str,
     return f"{seconds:.2f} s", f"{counts.faces}", f"{counts.open_edges}", valid, f"{error:+.1e}"
 
 
-def _copies(cells: int) -> list[TopoDS_Face]:
+def copies(cells: int) -> list[TopoDS_Face]:
     """The block's patches, half a wall below the mid-surface."""
     bases = {side: _patch_face(-side * THICKNESS / 2) for side in (-1, 1)}
     placements = cubic_cell()
@@ -109,7 +109,7 @@ def _patch_face(distance: float) -> TopoDS_Face:
     return BRepBuilderAPI_MakeFace(kernel_surface(surface), TOLERANCE).Face()
 
 
-def _thickened(shell: TopoDS_Shape) -> TopoDS_Shape:
+def thickened(shell: TopoDS_Shape) -> TopoDS_Shape:
     maker = BRepOffsetAPI_MakeThickSolid()
     maker.MakeThickSolidBySimple(shell, THICKNESS)
     return maker.Shape()

@@ -1,4 +1,4 @@
-"""Arrays inside frozen descriptions are read-only too."""
+"""Arrays that cannot be written to, and products of many vectors at once."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from dataclasses import fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["freeze_arrays"]
+__all__ = ["dot", "freeze_arrays"]
 
 
 def freeze_arrays(instance: Any) -> None:
@@ -24,3 +25,8 @@ def freeze_arrays(instance: Any) -> None:
             stored = np.array(value, order="C")
             stored.setflags(write=False)
             object.__setattr__(instance, field.name, stored)
+
+
+def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Scalar products of vectors along the last axis (``numpy.vecdot``, which numpy 1.26 does not have)."""
+    return np.asarray(np.sum(a * b, axis=-1))

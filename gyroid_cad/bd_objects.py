@@ -1,4 +1,4 @@
-"""build123d: ``Gyroid``, a part object like ``Box`` or ``Sphere``.
+"""build123d: ``Gyroid``, a part object like ``Box`` or ``Sphere``, and ``GyroidFill``, which fills a part.
 
 >>> from build123d import BuildPart
 >>> from gyroid_cad.bd_objects import Gyroid
@@ -8,13 +8,20 @@
 
 from __future__ import annotations
 
-from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, RotationLike
+from collections.abc import Sequence
+from typing import Any
+
+from build123d import Align, BasePartObject, BuildPart, Compound, Location, Mode, Part, RotationLike
+from build123d.build_common import BaseObject
 from build123d.geometry import to_align_offset
 
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields import FieldLike
+from gyroid_cad.filling import fill
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.lattice import FieldLike, Lattice, MapLike
+from gyroid_cad.lattice import Lattice, MapLike
 
-__all__ = ["Gyroid"]
+__all__ = ["Gyroid", "GyroidFill"]
 
 
 class Gyroid(BasePartObject):  # type: ignore[misc]
@@ -24,7 +31,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
@@ -53,10 +60,68 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         scale_field: FieldLike | None = None,
         map: MapLike | None = None,
         tolerance: float | None = None,
+        trim: str | None = None,
     ) -> None:
-        self.lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance)
+        self.lattice = Lattice(
+            cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim
+        )
         part = Part.cast(self.lattice.solid())
         if align is not None:
             # The host would measure the box on the kernel's faces; the control nets give it at once.
             part = part.moved(Location(to_align_offset(*self.lattice.bounding_box(), align)))
         super().__init__(part=part, rotation=rotation, align=None, mode=mode)
+
+
+class GyroidFill(Part, BaseObject):  # type: ignore[misc]
+    """Part Operation: GyroidFill
+
+    What is left of a part that is filled with gyroid.
+
+    Parameters
+    ----------
+    part : Part, Solid or Compound, optional
+        In a builder, the part made so far if left out.
+    cell_size, thickness, density, kind, skin, openings
+        As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings may be faces of the part,
+        such as ``part.faces().sort_by(Axis.Z)[-1:]``.
+    mode : Mode
+        In a builder, the filled part takes the place of what is there.
+    **settings
+        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, material_density, tolerance, lattice.
+
+    Attributes
+    ----------
+    report : FillReport
+
+    Raises
+    ------
+    ParameterError, SoundnessError, FitError, KernelError
+    """
+
+    _applies_to = [BuildPart._tag]  # noqa: RUF012 (the host's own declaration)
+
+    def __init__(
+        self,
+        part: Any = None,
+        cell_size: float | None = None,
+        thickness: FieldLike | None = None,
+        density: FieldLike | None = None,
+        kind: str = "sheet",
+        *,
+        skin: float | None = None,
+        openings: Sequence[Any] = (),
+        mode: Mode = Mode.REPLACE,
+        **settings: Any,
+    ) -> None:
+        context: BuildPart | None = BuildPart._get_context(self)
+        subject = part if part is not None or context is None else context.part
+        if subject is None:
+            raise ParameterError("part", part, "a part, or a builder with one in it")
+        filled = fill(subject, cell_size, thickness, density, kind, skin=skin, openings=openings, **settings)
+        self.report = filled.report
+        self.mode = mode
+        shape = Part.cast(filled.solid())
+        super().__init__(obj=(shape if isinstance(shape, Compound) else Compound([shape])).wrapped)
+        if context is not None:
+            # Not by way of the builder's locations: the part is where it is.
+            context._add_to_context(self, clean=False, mode=mode)

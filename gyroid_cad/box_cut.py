@@ -26,6 +26,8 @@ Booleans = NDArray[np.bool_]
 
 # Levels that agree to so many cell sizes are one: rounding in the patches' translations leaves 1e-15.
 _SAME_LEVEL = 1e-9
+# Of the sum of area vectors, in parts of the area; how closely the section curves are fitted leaves a tenth of it.
+_LARGEST_GAP = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,6 +129,8 @@ class BoxedWall:
         In mm3 and mm2, by Green's theorem over the pieces.
     distinct : int
         Faces that had to be cut, all alike counted once.
+    capped : bool
+        Whether it is closed.
     """
 
     wall: Wall
@@ -139,9 +143,12 @@ class BoxedWall:
     volumes: Floats
     areas: Floats
     distinct: int
+    capped: bool
 
 
-def cut_to_box(wall: Wall, box: Box, sides: list[tuple[int, bool]], cell_size: float, filled: bool) -> BoxedWall:
+def cut_to_box(
+    wall: Wall, box: Box, sides: list[tuple[int, bool]], cell_size: float, filled: bool, capped: bool = True
+) -> BoxedWall:
     """Cut a wall's faces to a box and close what is left with caps.
 
     Parameters
@@ -155,6 +162,8 @@ def cut_to_box(wall: Wall, box: Box, sides: list[tuple[int, bool]], cell_size: f
         In mm.
     filled : bool
         Whether the box's corners belong to what is wanted, should no face meet any of its edges.
+    capped : bool
+        Whether to close what is left; else it stays a surface with a border.
 
     Raises
     ------
@@ -164,7 +173,7 @@ def cut_to_box(wall: Wall, box: Box, sides: list[tuple[int, bool]], cell_size: f
     assembly = _Assembly(wall, box, cell_size)
     for side, backwards in sides:
         assembly.add_faces(side, backwards)
-    return assembly.closed(filled)
+    return assembly.finished(filled, capped)
 
 
 @dataclass(eq=False)
@@ -178,6 +187,7 @@ class _Assembly:
     arcs: list[list[CapArc]] = field(default_factory=lambda: [[] for _ in PLANES])
     fluxes: list[float] = field(default_factory=list)
     areas: list[float] = field(default_factory=list)
+    vectors: list[Floats] = field(default_factory=list)
     distinct: int = 0
 
     def __post_init__(self) -> None:
@@ -201,21 +211,42 @@ class _Assembly:
         for patch, index in zip(patches.tolist(), template.tolist(), strict=True):
             self._add_cut(patch, side, cut[index], backwards)
 
-    def closed(self, filled: bool) -> BoxedWall:
-        """With the caps."""
-        caps = caps_of(self.arcs, self.box.low, self.box.high, self._straight, filled)
+    def finished(self, filled: bool, capped: bool) -> BoxedWall:
+        """With the caps, if they are wanted."""
+        caps = caps_of(self.arcs, self.box.low, self.box.high, self._straight, filled) if capped else []
         uses = [[edge for loop in face.loops for edge, _ in loop] for face in self.faces]
         uses += [[edge for loop in cap.loops for edge, _ in loop] for cap in caps]
-        component = _components(uses, len(self.edges))
+        component = _components(uses, len(self.edges), capped)
         levels = self.box.levels
         fluxes = self.fluxes + [-PLANES[cap.plane][1] * levels[cap.plane] * cap.area / 3 for cap in caps]
         areas = self.areas + [cap.area for cap in caps]
+        if capped:
+            self._require_no_gap(caps, sum(areas))
         count = int(component.max()) + 1 if len(component) else 0
         totals = [np.asarray(np.bincount(component, values, count), dtype=np.float64) for values in (fluxes, areas)]
         points = [point @ self.box.axes.T for point in self.points]
         return BoxedWall(
-            self.wall, self.box, points, self.edges, self.faces, caps, component, totals[0], totals[1], self.distinct
+            self.wall,
+            self.box,
+            points,
+            self.edges,
+            self.faces,
+            caps,
+            component,
+            totals[0],
+            totals[1],
+            self.distinct,
+            capped,
         )
+
+    def _require_no_gap(self, caps: list[Cap], area: float) -> None:
+        """The area vectors of a closed surface add up to nothing."""
+        total = np.sum(self.vectors, axis=0) if self.vectors else np.zeros(3)
+        for cap in caps:
+            axis, sign = PLANES[cap.plane]
+            total[axis] -= sign * cap.area
+        if not np.linalg.norm(total) <= _LARGEST_GAP * area:
+            raise KernelError("what the box leaves of the lattice does not close: its area vectors do not add up to 0")
 
     def _positions(self, side: int) -> tuple[Booleans, Floats]:
         """Which patches' faces lie outside; and, from each patch's own place, levels of the planes that are near."""
@@ -237,6 +268,7 @@ class _Assembly:
         sign = -1.0 if backwards else 1.0
         self.fluxes += (sign * (sums[:, 0] + np.sum(self.shifts[patches] * sums[:, 1:4], axis=1) / 3)).tolist()
         self.areas += sums[:, 4].tolist()
+        self.vectors += list(sign * sums[:, 1:4])
         rims = [list(range(4))]
         for patch in patches.tolist():
             loop = [self._rim_edge(patch, side, k, 0, 1, -1.0, 1.0, None) for k in range(4)]
@@ -251,6 +283,7 @@ class _Assembly:
             self.faces.append(BoxFace(patch, side, loops, rims, backwards))
             self.fluxes.append(sign * (piece.flux + float(shift @ piece.area_vector) / 3))
             self.areas.append(piece.area)
+            self.vectors.append(sign * piece.area_vector)
 
     def _edge(self, patch: int, side: int, cut: CutFace, arc: Arc, backwards: bool) -> tuple[int, bool]:
         if arc.curve < 0:
@@ -336,14 +369,15 @@ def _alike(nets: Integers, levels: Floats, grain: float) -> tuple[Integers, Inte
     return kind.ravel(), nets[first], levels[first]
 
 
-def _components(uses: list[list[int]], edge_count: int) -> Integers:
-    """Faces that hang together by edges, each of which must be used twice."""
+def _components(uses: list[list[int]], edge_count: int, closed: bool) -> Integers:
+    """Faces that hang together by edges, each of which must be used twice, or once where there may be a border."""
     if not uses:
         return np.zeros(0, dtype=np.int64)
     face = np.repeat(np.arange(len(uses)), [len(edges) for edges in uses])
     edge = np.concatenate([np.array(edges, dtype=np.int64) for edges in uses])
-    if np.any(np.bincount(edge, minlength=edge_count) != 2):
+    used = np.bincount(edge, minlength=edge_count)
+    if np.any(used > 2) or np.any(used < (2 if closed else 1)):
         raise KernelError("what the box leaves of the lattice does not close: an edge is not shared by two faces")
     order = np.argsort(edge, kind="stable")
-    pairs = face[order].reshape(-1, 2)
+    pairs = face[order][np.repeat(used, used) == 2].reshape(-1, 2)
     return connected(len(uses), pairs[:, 0], pairs[:, 1])

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,14 +12,18 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gyroid_cad.complex import build_complex
+import numpy as np
+
+from gyroid_cad.box_cut import Box, cut_to_box
+from gyroid_cad.complex import CellComplex, build_complex
+from gyroid_cad.covering import AT_HOME, PHASES, covering_complex, wall_extremes
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.files import require_writable
-from gyroid_cad.fit import FitSettings, fit_patch
+from gyroid_cad.fit import FitSettings
 from gyroid_cad.grading import Grading
-from gyroid_cad.refit import Refit, fitted_wall, likely_control_points, measured
-from gyroid_cad.soundness import CLEARANCE_SAMPLES, FOLD_SAMPLES, require_sound, require_sound_fit
-from gyroid_cad.wall import Wall, build_wall
+from gyroid_cad.soundness import CLEARANCE_SAMPLES, FOLD_SAMPLES
+from gyroid_cad.stages import Progress, tell, timed
+from gyroid_cad.wall_fit import fit_wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
@@ -33,11 +36,8 @@ __all__ = [
     "build",
     "require_formats",
     "require_settings",
-    "timed",
     "write_shape",
 ]
-
-Progress = Callable[[str, int, int], None]
 
 FORMATS = {".step": "step", ".stp": "step", ".brep": "brep", ".stl": "stl"}
 
@@ -47,6 +47,9 @@ _FILE_BYTES_PER_CELL = 6_000_000
 _BASE_BYTES = 400_000_000
 # Volume in the kernel against that of the nets it was given: rounding only.
 _VOLUME_AGREEMENT = 1e-9
+# Of cut cells against whole ones: how closely the section curves are fitted.
+_BOXED_VOLUME_AGREEMENT = 1e-5
+_SHIFTS = float(np.abs(PHASES).max())
 _REMEMBERED_BUILDS = 2
 
 
@@ -61,12 +64,15 @@ class Recipe:
     settings : FitSettings
     tolerance : float
         Largest deviation of a wall that varies, in cell sizes; one that does not is fitted as the settings say.
+    boxed : bool
+        Whether it is cut to the block of cells.
     """
 
     cells: tuple[int, int, int]
     grading: Grading
     settings: FitSettings
     tolerance: float
+    boxed: bool = False
 
 
 class Build:
@@ -82,6 +88,9 @@ class Build:
     topology : Topology
     volume : float
         In mm3, from the control points the kernel holds.
+    patches : int
+    shift : tuple of float
+        Of the lattice in its box, in mm, where it could not be cut without.
     seconds : dict
         By stage.
     """
@@ -92,45 +101,70 @@ class Build:
         _require_memory(self.cells, _SOLID_BYTES_PER_CELL, recipe.settings.control_points)
         self.seconds: dict[str, float] = {}
         self._valid: bool | None = None
-        self.refit: Refit | None = None
+        self.shift = (0.0, 0.0, 0.0)
         with self.timed("complex", progress):
-            self.complex = build_complex(self.cells, closed=recipe.grading.closed)
-        self.wall = self._uniform_wall(progress) if recipe.grading.uniform else self._graded_wall(progress)
+            self.complex = self._complex()
+        self.wall, self.refit = fit_wall(
+            self.complex,
+            recipe.grading,
+            recipe.settings,
+            recipe.tolerance,
+            lambda stage: self.timed(stage, progress),
+            lambda control_points: _require_memory(self.cells, _SOLID_BYTES_PER_CELL, control_points),
+        )
         with self.timed("kernel", progress):
             from gyroid_cad.kernel.check import enclosed_volume, topology
             from gyroid_cad.kernel.solid import realise
-        with self.timed("solid", progress):
-            self._shape = realise(self.wall, lambda done, total: tell(progress, "solid", done, total))
+        if recipe.boxed:
+            self._shape, self.volume, self.patches = self._boxed(progress)
+            expected, agreement = self._volume_in_box(), _BOXED_VOLUME_AGREEMENT
+        else:
+            with self.timed("solid", progress):
+                self._shape = realise(self.wall, lambda done, total: tell(progress, "solid", done, total))
+            self.volume, self.patches = enclosed_volume(self._shape), self.complex.patch_count
+            expected, agreement = self.wall.volume(), _VOLUME_AGREEMENT
         with self.timed("check", progress):
             self.topology = topology(self._shape)
-            self.volume = enclosed_volume(self._shape)
-            self._require_closed_and_full()
+            self._require_closed_and_full(expected, agreement)
 
-    def _uniform_wall(self, progress: Progress | None) -> Wall:
-        with self.timed("fit", progress):
-            patch = fit_patch(self.recipe.settings)
+    def _complex(self) -> CellComplex:
         grading = self.recipe.grading
-        with self.timed("wall", progress):
-            return build_wall(self.complex, patch, grading.cell_size, float(grading.thickness))  # type: ignore[arg-type]
+        if not self.recipe.boxed:
+            return build_complex(self.cells, closed=grading.closed)
+        low, high = np.zeros(3), np.array(self.cells) * grading.cell_size
+        reach = wall_extremes(low, high, AT_HOME, grading)[1] / 2 + _SHIFTS * grading.cell_size
+        return covering_complex(low, high, AT_HOME, grading.cell_size, reach)
 
-    def _graded_wall(self, progress: Progress | None) -> Wall:
-        """Check that the wall can exist, and fit it until it is as close as asked for."""
-        grading, tolerance, n = self.recipe.grading, self.recipe.tolerance, 0
-        with self.timed("soundness", progress):
-            require_sound(self.complex, grading)
-        with self.timed("deviation", progress):
-            wanted = likely_control_points(self.complex, grading, self.recipe.settings.control_points, tolerance)
-        while n != wanted:
-            n = wanted
-            _require_memory(self.cells, _SOLID_BYTES_PER_CELL, n)
-            with self.timed("fit", progress):
-                wall = fitted_wall(self.complex, grading, n)
-            with self.timed("deviation", progress):
-                self.refit = measured(wall.nets, self.complex, grading)
-            wanted = self.refit.control_points_for(tolerance, grading.cell_size)
-        with self.timed("soundness", progress):
-            require_sound_fit(wall, grading)
-        return wall
+    def _boxed(self, progress: Progress | None) -> tuple[KernelShape, float, int]:
+        """The shape cut to the block of cells, its volume, and how many patches are in it."""
+        from gyroid_cad.kernel.boxed import realise_boxed
+        from gyroid_cad.kernel.split import compound_of
+
+        size = self.recipe.grading.cell_size
+        box = Box(np.eye(3), np.zeros(3), np.array(self.cells) * size)
+        problem: KernelError | None = None
+        for phase in PHASES:
+            shift = np.array(phase) * size
+            try:
+                with self.timed("cut", progress):
+                    # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
+                    left = cut_to_box(self.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True)
+                with self.timed("solid", progress):
+                    solids = realise_boxed(left)
+            except KernelError as failed:
+                problem = problem or failed
+                continue
+            self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
+            shape = solids[0] if len(solids) == 1 else compound_of(solids)
+            return shape, float(left.volumes.sum()), len({face.patch for face in left.faces})
+        raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
+
+    def _volume_in_box(self) -> float | None:
+        """Of whole cells, all alike; none where they vary."""
+        if not self.recipe.grading.uniform:
+            return None
+        cell = np.unique(self.wall.patch_net, return_index=True)[1]
+        return prod(self.cells) * self.wall.volume(cell)
 
     @contextmanager
     def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
@@ -141,6 +175,8 @@ class Build:
     @cached_property
     def bounding_box(self) -> tuple[list[float], list[float]]:
         """Lowest and highest corner of the box round the wall, in mm."""
+        if self.recipe.boxed:
+            return [0.0, 0.0, 0.0], [count * self.recipe.grading.cell_size for count in self.cells]
         low, high = self.wall.bounding_box()
         return low.tolist(), high.tolist()
 
@@ -148,6 +184,11 @@ class Build:
     def thinnest(self) -> float:
         """The thinnest wall, in mm."""
         return float(self.recipe.grading.thickness) if self.refit is None else self.refit.thinnest  # type: ignore[arg-type]
+
+    @property
+    def thickest(self) -> float:
+        """The thickest wall, in mm."""
+        return float(self.recipe.grading.thickness) if self.refit is None else self.refit.thickest  # type: ignore[arg-type]
 
     @property
     def samples_per_patch(self) -> dict[str, int]:
@@ -187,16 +228,15 @@ class Build:
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                write_shape(self._shape, path, schema, deviation, angle)
+                write_shape(self._shape, path, schema, deviation, angle, cut=self.recipe.boxed)
 
-    def _require_closed_and_full(self) -> None:
+    def _require_closed_and_full(self, expected: float | None, agreement: float) -> None:
         if not self.topology.closed:
             raise KernelError(
                 f"the kernel's shape of {self.cells} cells is not closed: "
                 f"{self.topology.open_edges} edges do not bound exactly two faces"
             )
-        expected = self.wall.volume()
-        if not abs(self.volume - expected) <= _VOLUME_AGREEMENT * expected:
+        if expected is not None and not abs(self.volume - expected) <= agreement * expected:
             raise KernelError(
                 f"the kernel's shape of {self.cells} cells encloses {self.volume:.9g} mm3, "
                 f"its control nets {expected:.9g} mm3"
@@ -302,19 +342,3 @@ def _require_memory(cells: tuple[int, int, int], bytes_per_cell: int, control_po
             f"at most about {most} cells in all: these take about {needed / 1e9:.3g} GB of memory "
             f"and {available / 1e9:.3g} GB are free",
         )
-
-
-@contextmanager
-def timed(seconds: dict[str, float], stage: str, progress: Progress | None) -> Iterator[None]:
-    """Tell that a stage begins and ends, and add the seconds between to those of the stage."""
-    start = time.perf_counter()
-    tell(progress, stage, 0, 1)
-    yield
-    tell(progress, stage, 1, 1)
-    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
-
-
-def tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
-    """Tell how far a stage has come, if anyone listens."""
-    if progress is not None:
-        progress(stage, done, total)

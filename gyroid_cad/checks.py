@@ -6,9 +6,12 @@ from math import inf, isfinite, nan
 from numbers import Real
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["finite_number", "hashable", "positive_number"]
+__all__ = ["finite_number", "finite_numbers", "hashable", "positive_number", "three_numbers"]
 
 
 def finite_number(parameter: str, value: object, accepted: str = "a finite number") -> float:
@@ -54,6 +57,35 @@ def positive_number(parameter: str, value: object, accepted: str = "a finite num
     if number <= 0:
         raise ParameterError(parameter, value, accepted)
     return number
+
+
+def finite_numbers(
+    parameter: str, value: object, accepted: str, shape: tuple[int, ...] | None = None
+) -> NDArray[np.float64]:
+    """Real, finite numbers as an array, of a given shape if there is one.
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        array = np.array(value)
+    except (TypeError, ValueError):
+        raise ParameterError(parameter, value, accepted) from None
+    fits = array.dtype.kind in "iuf" and (shape is None or array.shape == shape)
+    if not fits or not np.isfinite(array).all():
+        raise ParameterError(parameter, value, accepted)
+    return array.astype(np.float64)
+
+
+def three_numbers(parameter: str, value: object) -> NDArray[np.float64]:
+    """Coordinates of a point, or angles about the axes; shape (3,).
+
+    Raises
+    ------
+    ParameterError
+    """
+    return finite_numbers(parameter, value, "three finite numbers", (3,))
 
 
 def hashable(function: Any) -> Any:

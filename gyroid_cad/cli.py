@@ -74,6 +74,7 @@ def _defaults_from_file(context: click.Context, parameter: click.Parameter, path
 @click.option("--thickness-factor", metavar="T", help="The paper's: whole wall in BC units, instead of --thickness.")
 @click.option("--bc-length", metavar="B", help="The paper's: length of a bounding cell, instead of --cell-size.")
 @click.option("--scale", type=float, metavar="MM", help="Millimetres per unit of BC length; 1 if left out.")
+@click.option("--trim", metavar="SHAPE", help="box: cut to the block of cells, flat sides instead of whole patches.")
 @click.option(
     "--tolerance",
     type=float,
@@ -118,6 +119,7 @@ def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **
     \b
     gyroid-cad build -o part.step -o part.stl --cells 2 2 2 --cell-size 10 --thickness 0.8
     gyroid-cad build -o part.step --cells 3 3 1 --cell-size 10 --thickness "0.6 + 0.04*x"
+    gyroid-cad build -o block.step --cells 5 5 5 --cell-size 7 --density 0.3 --trim box
     gyroid-cad build -o ring.step --cells 12 2 1 --cell-size 10 --density 0.2 --map cylinder:radius=20,angle=360
     gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
     """
@@ -155,12 +157,12 @@ def _lattice(given: dict[str, Any]) -> Lattice:
         raise click.UsageError("Missing option '--cells'.")
     fit = _fit_settings(given["fit"], given["control_points"])
     if any(given[name] is not None for name in _PAPER_OPTIONS):
-        mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map") if given[name] is not None]
+        mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map", "trim") if given[name] is not None]
         if mixed or given["thickness_factor"] is None:
             options = ", ".join(map(_option, _PAPER_OPTIONS))
             raise click.UsageError(
                 f"{options} are the paper's units: they need --thickness-factor, and not "
-                + ", ".join(map(_option, mixed or (*_OWN_OPTIONS, "cell_size", "map")))
+                + ", ".join(map(_option, mixed or (*_OWN_OPTIONS, "cell_size", "map", "trim")))
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
         return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"])
@@ -168,7 +170,7 @@ def _lattice(given: dict[str, Any]) -> Lattice:
         raise click.UsageError("Missing option '--cell-size'.")
     if (given["thickness"] is None) == (given["density"] is None):
         raise click.UsageError("give exactly one of --thickness and --density")
-    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance")}
+    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
     return Lattice(given["cells"], given["cell_size"], **own, fit=fit)
 
 

@@ -21,14 +21,29 @@ __all__ = ["fill_command"]
     "-o", "--output", multiple=True, required=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated."
 )
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
-@click.option("--thickness", type=float, metavar="MM", help="Whole wall, below 0.37647 of the cell size.")
-@click.option("--density", type=float, metavar="RHO", help="Volume fraction of the wall, or of the labyrinth, instead.")
+@click.option(
+    "--thickness",
+    metavar="MM",
+    help='Whole wall: a number, below 0.37647 of the cell size, or an expression such as "0.8 + 0.02*x".',
+)
+@click.option(
+    "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a labyrinth."
+)
+@click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
+@click.option(
+    "--opening",
+    "openings",
+    multiple=True,
+    metavar="FACE",
+    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; "
+    "may be repeated.",
+)
 @click.option(
     "--kind",
-    type=click.Choice(["sheet", "network-a", "network-b", "channels"]),
+    type=click.Choice(["sheet", "network-a", "network-b", "channels", "surface"]),
     default="sheet",
     show_default=True,
-    help="The wall, one of the two labyrinths it parts, or both of them without the wall.",
+    help="The wall, one of the two labyrinths it parts, both of them without the wall, or the mid-surface alone.",
 )
 @click.option("--origin", nargs=3, type=float, default=(0, 0, 0), metavar="X Y Z", help="Of the lattice, in mm.")
 @click.option("--rotation", nargs=3, type=float, default=(0, 0, 0), metavar="A B C", help="About x, y, z, in degrees.")
@@ -51,6 +66,7 @@ def fill_command(
     schema: str,
     deviation: float | None,
     angle: float,
+    openings: tuple[str, ...],
     as_json: bool,
     quiet: bool,
     **given: Any,
@@ -59,6 +75,7 @@ def fill_command(
 
     \b
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
+    gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --skin 1 --opening ">Z"
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
     """
     start = time.perf_counter()
@@ -69,7 +86,8 @@ def fill_command(
     require_formats(output)
     require_settings((1, 1, 1), schema, deviation, angle)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        filled = fill(part, fit=FitSettings(control_points), progress=progress, **given)
+        faces = [_face(opening) for opening in openings]
+        filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
         filled.write(*output, schema=schema, deviation=deviation, angle=angle)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
@@ -78,3 +96,11 @@ def fill_command(
         click.echo(json.dumps(summary))
     elif not quiet:
         print_fill(summary)
+
+
+def _face(opening: str) -> str | list[float]:
+    """A selector as it stands, or the coordinates of a point."""
+    try:
+        return [float(number) for number in opening.split(",")]
+    except ValueError:
+        return opening

@@ -13,10 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.complex import CellComplex, build_complex, connected
-from gyroid_cad.exact_wall import patch_points, patch_points_and_normals
+from gyroid_cad.exact_wall import laid_patches, patch_points, patch_points_and_normals
+from gyroid_cad.grading import Grading
 from gyroid_cad.symmetry import CELL_QUARTERS, cubic_cell
+from gyroid_cad.tube import LARGEST_THICKNESS
 
-__all__ = ["CROSSING", "INSIDE", "OUTSIDE", "Frame", "covering_complex", "patch_sides", "signed_offsets"]
+__all__ = [
+    "AT_HOME",
+    "CROSSING",
+    "INSIDE",
+    "OUTSIDE",
+    "PHASES",
+    "SIDE_SAMPLES",
+    "Frame",
+    "covering_complex",
+    "nearest_offsets",
+    "patch_sides",
+    "periodic_offsets",
+    "sides_of_points",
+    "wall_extremes",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,7 +41,11 @@ Booleans = NDArray[np.bool_]
 OUTSIDE, CROSSING, INSIDE = -1, 0, 1
 # From the middle of a patch to its corners, in quarters of the bounding-cell length: (2, 0, 1).
 _PATCH_RADIUS = np.sqrt(5) / CELL_QUARTERS
-_SAMPLES = 7
+# Along each side of a patch, whose middle is among them.
+SIDE_SAMPLES = 7
+# Of the lattice, in cell sizes: tangent or nearly coincident faces cannot be cut; a shift that no symmetry knows parts
+# them.
+PHASES = ((0.0, 0.0, 0.0), (0.0031, 0.0047, 0.0023), (-0.0053, 0.0029, 0.0071))
 _OFFSET_SAMPLES = 17
 
 
@@ -50,6 +70,9 @@ class Frame:
     def placed(self, points: Floats) -> Floats:
         """Points of the lattice's own space in the part's; shape (..., 3)."""
         return points @ self.rotation.T + self.origin
+
+
+AT_HOME = Frame(np.zeros(3), np.eye(3))
 
 
 def covering_complex(low: Floats, high: Floats, frame: Frame, cell_size: float, reach: float) -> CellComplex:
@@ -82,6 +105,15 @@ def covering_complex(low: Floats, high: Floats, frame: Frame, cell_size: float, 
     return build_complex((nx, ny, nz), placements, first=(x, y, z), wanted=near)
 
 
+def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> tuple[float, float]:
+    """The thinnest and the thickest wall of patches that may come near a box in the part's space, in mm."""
+    if grading.uniform:
+        return float(grading.thickness), float(grading.thickness)  # type: ignore[arg-type]
+    complex = covering_complex(low, high, frame, grading.cell_size, LARGEST_THICKNESS / 2 * grading.cell_size)
+    walls = [laid.thickness for _, laid in laid_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES))]
+    return min(float(some.min()) for some in walls), max(float(some.max()) for some in walls)
+
+
 def patch_sides(
     complex: CellComplex,
     frame: Frame,
@@ -103,17 +135,38 @@ def patch_sides(
     holds : callable
         Which of some points lie inside the part.
     """
-    samples = np.linspace(-1, 1, _SAMPLES)
-    points = frame.placed(patch_points(complex, cell_size, samples))
-    middle = points[:, _SAMPLES**2 // 2]
-    clear = distance(middle) > _PATCH_RADIUS * cell_size + reach
-    near = np.flatnonzero(~clear)
+    points = frame.placed(patch_points(complex, cell_size, np.linspace(-1, 1, SIDE_SAMPLES)))
+    return sides_of_points(complex, points, reach, distance, holds)
+
+
+def sides_of_points(
+    complex: CellComplex,
+    points: Floats,
+    reach: float,
+    distance: Callable[[Floats], Floats],
+    holds: Callable[[Floats], Booleans],
+) -> Integers:
+    """The same, of patches wherever they lie; shape (patches,).
+
+    Parameters
+    ----------
+    complex : CellComplex
+    points : ndarray, shape (patches, :data:`SIDE_SAMPLES` squared, 3)
+        Of the mid-surface, on a grid, in mm.
+    reach : float
+        In mm.
+    distance, holds : callable
+        As of :func:`patch_sides`.
+    """
     # Every place of a patch is within half a step between samples, along both sides, of one of them.
-    grid = points.reshape(-1, _SAMPLES, _SAMPLES, 3)
+    grid = points.reshape(-1, SIDE_SAMPLES, SIDE_SAMPLES, 3)
     steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)]
-    clear[near] = (
-        distance(points[near].reshape(-1, 3)).reshape(len(near), _SAMPLES**2).min(axis=1) > sum(steps) / 2 + reach
-    )
+    gap = sum(steps) / 2
+    middle = points[:, SIDE_SAMPLES**2 // 2]
+    radius = np.linalg.norm(points - middle[:, np.newaxis], axis=-1).max(axis=1) + gap
+    clear = distance(middle) > radius + reach
+    near = np.flatnonzero(~clear)
+    clear[near] = distance(points[near].reshape(-1, 3)).reshape(len(near), SIDE_SAMPLES**2).min(axis=1) > gap + reach
     sides = np.full(complex.patch_count, CROSSING)
     both = complex.edge_patches[~complex.free]
     both = both[clear[both].all(axis=1)]
@@ -125,13 +178,11 @@ def patch_sides(
     return sides
 
 
-def signed_offsets(complex: CellComplex, frame: Frame, cell_size: float, points: Floats) -> Floats:
-    """How far points of the part's space lie from the mid-surface, along its normal, to about 1e-3 cell sizes.
+def periodic_offsets(frame: Frame, cell_size: float, points: Floats) -> Floats:
+    """How far points of the part's space lie from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
 
     Parameters
     ----------
-    complex : CellComplex
-        Patches that cover the points.
     frame : Frame
     cell_size : float
         In mm.
@@ -142,10 +193,29 @@ def signed_offsets(complex: CellComplex, frame: Frame, cell_size: float, points:
     ndarray, shape (n,)
         In mm; positive on the side that the common normal points to.
     """
+    cell = covering_complex(np.zeros(3), np.full(3, cell_size), AT_HOME, cell_size, 0.0)
+    places, normals = patch_points_and_normals(cell, cell_size, np.linspace(-1, 1, _OFFSET_SAMPLES))
+    own = np.mod(frame.own(points), cell_size)
+    return nearest_offsets(places, normals, own)[0]
+
+
+def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
+    """How far points lie from samples of a surface, along its normal.
+
+    Parameters
+    ----------
+    places, normals : ndarray, shape (..., 3)
+        Of the surface.
+    points : ndarray, shape (n, 3)
+
+    Returns
+    -------
+    offsets : ndarray, shape (n,)
+    nearest : ndarray of int, shape (n,)
+        Flat indices of the samples.
+    """
     from scipy.spatial import cKDTree
 
-    samples = np.linspace(-1, 1, _OFFSET_SAMPLES)
-    places, normals = (a.reshape(-1, 3) for a in patch_points_and_normals(complex, cell_size, samples))
-    own = frame.own(points)
-    nearest = cKDTree(places).query(own)[1]
-    return np.asarray(np.sum((own - places[nearest]) * normals[nearest], axis=1))
+    places, normals = places.reshape(-1, 3), normals.reshape(-1, 3)
+    nearest = np.asarray(cKDTree(places).query(points)[1], dtype=np.int64)
+    return np.asarray(np.sum((points - places[nearest]) * normals[nearest], axis=1)), nearest

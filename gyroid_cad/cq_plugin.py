@@ -1,8 +1,9 @@
-"""CadQuery: importing this module adds ``Workplane.gyroid``, and nothing else.
+"""CadQuery: importing this module adds ``Workplane.gyroid`` and ``Workplane.gyroid_fill``, and nothing else.
 
 >>> import cadquery as cq
 >>> import gyroid_cad.cq_plugin
 >>> result = cq.Workplane().gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8)
+>>> light = cq.Workplane().box(12, 9, 8).gyroid_fill(cell_size=8, density=0.3)
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from typing import Any
 import cadquery as cq
 
 from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.fields import FieldLike
+from gyroid_cad.filling import fill
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.lattice import FieldLike, Lattice, MapLike
+from gyroid_cad.lattice import Lattice, MapLike
 
-__all__ = ["gyroid"]
-
-_NAME = "gyroid"
+__all__ = ["gyroid", "gyroid_fill"]
 
 
 def gyroid(
@@ -34,12 +35,13 @@ def gyroid(
     scale_field: FieldLike | None = None,
     map: MapLike | None = None,
     tolerance: float | None = None,
+    trim: str | None = None,
 ) -> cq.Workplane:
     """A gyroid lattice at each point of the stack.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -58,7 +60,7 @@ def gyroid(
     ------
     ParameterError, FitError, KernelError
     """
-    lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance)
+    lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim)
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
     if len(per_axis) != 3:
@@ -68,14 +70,59 @@ def gyroid(
     return self.eachpoint(shape.moved, True, combine, clean)
 
 
+def gyroid_fill(
+    self: cq.Workplane,
+    cell_size: float | None = None,
+    thickness: FieldLike | None = None,
+    density: FieldLike | None = None,
+    kind: str = "sheet",
+    *,
+    skin: float | None = None,
+    **settings: Any,
+) -> cq.Workplane:
+    """Fill the solid in the chain; what is left takes its place.
+
+    As with ``Workplane.shell``, faces that are selected are where the skin is left open:
+    ``part.faces(">Z").gyroid_fill(7, density=0.3, skin=1)``.
+
+    Parameters
+    ----------
+    cell_size, thickness, density, kind, skin
+        As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates.
+    **settings
+        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, openings, tolerance, lattice.
+
+    Returns
+    -------
+    Workplane
+        With one object: the solid, or a compound where there are several; the bare surface is a compound of shells.
+
+    Raises
+    ------
+    ParameterError, SoundnessError, FitError, KernelError
+    """
+    selected = [shape for shape in self.objects if isinstance(shape, cq.Face)]
+    if selected:
+        settings["openings"] = [*settings.get("openings", ()), *selected]
+    try:
+        part = self.findSolid()
+    except ValueError:
+        raise ParameterError("part", self, "a chain with a solid in it") from None
+    made = fill(part, cell_size, thickness, density, kind, skin=skin, **settings)
+    return self.newObject([cq.Shape.cast(made.solid())])
+
+
 def _install() -> None:
-    present = getattr(cq.Workplane, _NAME, None)
-    if present is not None and getattr(present, "__module__", None) != __name__:
-        raise GyroidError(
-            f"cadquery.Workplane.{_NAME} is taken by {getattr(present, '__module__', present)}; "
-            "gyroid_cad.cq_plugin does not replace it"
-        )
+    for addition in (gyroid, gyroid_fill):
+        name = addition.__name__
+        present = getattr(cq.Workplane, name, None)
+        if present is not None and getattr(present, "__module__", None) != __name__:
+            raise GyroidError(
+                f"cadquery.Workplane.{name} is taken by {getattr(present, '__module__', present)}; "
+                "gyroid_cad.cq_plugin does not replace it"
+            )
     cq.Workplane.gyroid = gyroid
+    cq.Workplane.gyroid_fill = gyroid_fill
 
 
 _install()

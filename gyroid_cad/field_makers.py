@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gyroid_cad.checks import finite_number, positive_number
+from gyroid_cad.checks import finite_number, finite_numbers, positive_number, three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields import Field, Floats, as_field, call_text, compiled_field, derived, shown
 
@@ -61,7 +61,7 @@ def expression(text: str) -> Field:
 
 def distance_from_point(point: Point) -> Field:
     """The distance in mm from a point; raises ParameterError if that isn't three finite numbers."""
-    centre = _point("point", point)
+    centre = three_numbers("point", point)
     return Field(_distance(centre), call_text("distance_from_point", centre))
 
 
@@ -73,7 +73,7 @@ def distance_from_axis(point: Point, direction: Point) -> Field:
     ParameterError
         If either isn't three finite numbers, or the direction is zero.
     """
-    through, along = _point("point", point), _point("direction", direction)
+    through, along = three_numbers("point", point), three_numbers("direction", direction)
     return Field(_distance(through, _unit("direction", along)), call_text("distance_from_axis", through, along))
 
 
@@ -103,8 +103,8 @@ def radial(
         If anything isn't finite, the radius is not above 0 or the axis is zero.
     """
     values = finite_number("centre_value", centre_value), finite_number("outer_value", outer_value)
-    reach, middle = positive_number("radius", radius), _point("centre", centre)
-    line = None if axis is None else _point("axis", axis)
+    reach, middle = positive_number("radius", radius), three_numbers("centre", centre)
+    line = None if axis is None else three_numbers("axis", axis)
     distance = _distance(middle, None if line is None else _unit("axis", line))
     named = {"centre": middle if middle.any() else None, "axis": line}
     text = call_text("radial", *values, reach, **{name: value for name, value in named.items() if value is not None})
@@ -122,7 +122,7 @@ def between_planes(first_value: float, second_value: float, first_point: Point, 
         If anything isn't finite, or the points are the same.
     """
     values = finite_number("first_value", first_value), finite_number("second_value", second_value)
-    start, end = _point("first_point", first_point), _point("second_point", second_point)
+    start, end = three_numbers("first_point", first_point), three_numbers("second_point", second_point)
     length = float(np.linalg.norm(end - start))
     if not 0 < length < inf:
         raise ParameterError("second_point", second_point, f"another point than first_point, {shown(start)}")
@@ -149,7 +149,7 @@ def sampled(axes: Sequence[ArrayLike], values: ArrayLike, method: str | None = N
     """
     grid = _grid(axes)
     shape = tuple(len(axis) for axis in grid)
-    heights = _numbers("values", values, f"finite numbers in the shape {shape} of the axes", shape)
+    heights = finite_numbers("values", values, f"finite numbers in the shape {shape} of the axes", shape)
     allowed = ("linear", "cubic") if min(shape) >= 4 else ("linear",)
     kind = allowed[-1] if method is None else method
     if kind not in allowed:
@@ -194,21 +194,6 @@ def _blend(name: str, sign: float, first: object, second: object, width: float) 
     return derived(blend, parts, call_text(name, *given, reach))
 
 
-def _numbers(parameter: str, value: object, accepted: str, shape: tuple[int, ...] | None = None) -> Floats:
-    try:
-        array = np.array(value)
-    except (TypeError, ValueError):
-        raise ParameterError(parameter, value, accepted) from None
-    fits = array.dtype.kind in "iuf" and (shape is None or array.shape == shape)
-    if not fits or not np.isfinite(array).all():
-        raise ParameterError(parameter, value, accepted)
-    return array.astype(np.float64)
-
-
-def _point(parameter: str, value: object) -> Floats:
-    return _numbers(parameter, value, "three finite numbers", (3,))
-
-
 def _unit(parameter: str, direction: Floats) -> Floats:
     largest = np.abs(direction).max()
     if not largest:
@@ -232,7 +217,7 @@ def _grid(axes: Sequence[ArrayLike]) -> list[Floats]:
     accepted = "three vectors of increasing finite coordinates in mm, each at least two long"
     if not isinstance(axes, Sequence | np.ndarray) or len(axes) != 3:
         raise ParameterError("axes", axes, accepted)
-    grid = [_numbers("axes", axis, accepted) for axis in axes]
+    grid = [finite_numbers("axes", axis, accepted) for axis in axes]
     if any(axis.ndim != 1 or axis.size < 2 or not np.all(np.diff(axis) > 0) for axis in grid):
         raise ParameterError("axes", axes, accepted)
     return grid

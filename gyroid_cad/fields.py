@@ -16,7 +16,18 @@ from gyroid_cad.checks import finite_number, hashable
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.expressions import Expression, compile_expression
 
-__all__ = ["Field", "Floats", "as_field", "call_text", "compiled_field", "derived", "evaluated", "given_as", "shown"]
+__all__ = [
+    "Field",
+    "FieldLike",
+    "Floats",
+    "as_field",
+    "call_text",
+    "compiled_field",
+    "derived",
+    "evaluated",
+    "given_as",
+    "shown",
+]
 
 Floats = NDArray[np.float64]
 Function = Callable[[Floats, Floats, Floats], ArrayLike]
@@ -101,6 +112,9 @@ class Field:
         return derived(
             lambda values: np.clip(values, *bounds), (self,), f"{_inner(self)}.{call_text('clipped', low, high)}"
         )
+
+
+FieldLike = float | str | Field | Callable[..., ArrayLike]
 
 
 def as_field(parameter: str, value: object, meaning: str) -> float | Field:

@@ -12,32 +12,40 @@ from typing import TYPE_CHECKING, Self
 from numpy.typing import ArrayLike
 
 from gyroid_cad.block_maps import as_map, space_over
-from gyroid_cad.build import Build, Progress, Recipe, build, require_formats, require_settings
+from gyroid_cad.build import Build, Recipe, build, require_formats, require_settings
 from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.fields import Field, as_field
+from gyroid_cad.fields import Field, FieldLike, as_field
 from gyroid_cad.fit import FitSettings, fit_within
 from gyroid_cad.grading import Grading
-from gyroid_cad.limits import require_cell_size, require_density, require_thickness, whole_cells
+from gyroid_cad.limits import (
+    require_cell_size,
+    require_density,
+    require_one,
+    require_thickness,
+    sound_tolerance,
+    whole_cells,
+)
 from gyroid_cad.maps import BlockMap
 from gyroid_cad.paper import paper_units
 from gyroid_cad.report import LatticeReport, report_of
+from gyroid_cad.stages import Progress
 from gyroid_cad.tube import density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["FieldLike", "Lattice", "LatticeReport", "MapLike"]
+__all__ = ["Lattice", "LatticeReport", "MapLike"]
 
 Corner = tuple[float, float, float]
-FieldLike = float | str | Field | Callable[..., ArrayLike]
 MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
 # Of a lattice that varies, in cell sizes.
 USUAL_TOLERANCE = 1e-4
+BOX = "box"
 _LENGTH = "a length in mm, a finite number"
 _FIELDS = {
     "thickness": "a length in mm",
@@ -78,6 +86,8 @@ class Lattice:
     tolerance : float, optional
         Largest deviation of the fit in cell sizes: the number of control points rises until it is met. If left
         out, 1e-4 where the lattice varies, and ``fit`` as it is where cells are alike.
+    trim : {"box"}, optional
+        Cut to the block of cells itself, with flat sides, instead of whole patches. Not where space varies.
 
     Raises
     ------
@@ -93,6 +103,7 @@ class Lattice:
     scale_field: FieldLike | None = None
     map: MapLike | None = None
     tolerance: float | None = None
+    trim: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -100,15 +111,14 @@ class Lattice:
             self, "cell_size", finite_number("cell_size", self.cell_size, "a length in mm, a finite number")
         )
         require_cell_size(self.cell_size)
-        if (self.thickness is None) == (self.density is None):
-            given = {"thickness": self.thickness, "density": self.density}
-            raise ParameterError("thickness, density", given, "exactly one of the two")
+        require_one(self.thickness, self.density)
         for name, meaning in _FIELDS.items():
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
         if self.map is not None:
             object.__setattr__(self, "map", as_map(self.map))
         self._require_fit()
+        self._require_trim()
         if not self.uniform:
             self._require_variable()
         elif self.density is None:
@@ -194,11 +204,11 @@ class Lattice:
         FitError
             If the fit's edges do not meet those of its neighbours.
         """
-        return self._build().wall
+        return self.built().wall
 
     def bounding_box(self) -> tuple[Corner, Corner]:
         """Lowest and highest corner of the box round the wall, in mm."""
-        low, high = self._build().bounding_box
+        low, high = self.built().bounding_box
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:
@@ -226,14 +236,16 @@ class Lattice:
         ParameterError
             If memory would not do, or the wall is so thick that the fit folds over.
         """
-        return self._build(progress).solid()
+        return self.built(progress).solid()
 
     def report(self, progress: Progress | None = None) -> LatticeReport:
         """Build the solid if it isn't yet, have the kernel check it too, and say what it is."""
-        built = self._build(progress)
+        built = self.built(progress)
         built.valid(progress)
         with built.timed("fit report"):
-            measures = (self.wall_thickness, self.volume_fraction, self.exact_volume)
+            # Of a wall that varies and is cut there is no exact volume to compare with.
+            exact = self.exact_volume if self.uniform or not self.trim else None
+            measures = (self.wall_thickness, self.volume_fraction, exact)
         return report_of(built, *measures)
 
     def write(
@@ -268,15 +280,17 @@ class Lattice:
         targets = require_formats(paths)
         limit = None if deviation is None else finite_number("deviation", deviation, _LENGTH)
         require_settings(self.cells, schema, limit, angle)
-        built = self._build(progress)
+        built = self.built(progress)
         usual = min(self.cell_size / 1000, built.thinnest / 10)
         built.write(targets, schema, usual if limit is None else limit, angle, progress)
 
-    def _build(self, progress: Progress | None = None) -> Build:
+    def built(self, progress: Progress | None = None) -> Build:
+        """The build behind everything else: complex, wall, fit and solid."""
         settings = self.fit
         if self.uniform and self.tolerance is not None:
             settings = fit_within(settings, self.tolerance)
-        return build(Recipe(self.cells, self._grading(), settings, self.tolerance or USUAL_TOLERANCE), progress)
+        tolerance = self.tolerance or USUAL_TOLERANCE
+        return build(Recipe(self.cells, self._grading(), settings, tolerance, self.trim == BOX), progress)
 
     def _grading(self) -> Grading:
         if self.uniform:
@@ -297,6 +311,12 @@ class Lattice:
         if self.scale_field is not None and any(self._grading().map_closes):
             raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
 
+    def _require_trim(self) -> None:
+        if self.trim not in (None, BOX):
+            raise ParameterError("trim", self.trim, f"{BOX}, or none for whole patches")
+        if self.trim and (self.scale_field is not None or self.map is not None):
+            raise ParameterError("trim", self.trim, "none where a map or a scale field carries the block elsewhere")
+
     def _require_fit(self) -> None:
         if not isinstance(self.fit, FitSettings):
             raise ParameterError("fit", self.fit, "a FitSettings")
@@ -308,10 +328,7 @@ class Lattice:
                 "there the number of control points rises with the tolerance",
             )
         if self.tolerance is not None:
-            accepted = "a part of the cell size, a finite number above 0 and below 1"
-            object.__setattr__(self, "tolerance", finite_number("tolerance", self.tolerance, accepted))
-            if not 0 < self.tolerance < 1:
-                raise ParameterError("tolerance", self.tolerance, accepted)
+            object.__setattr__(self, "tolerance", sound_tolerance(self.tolerance))
 
 
 @lru_cache(maxsize=16)

@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from numbers import Integral
 
+from gyroid_cad.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.grading import THINNEST_WALL
 from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, density_of_thickness, thickness_of_density
 
-__all__ = ["require_cell_size", "require_density", "require_thickness", "whole_cells"]
+__all__ = [
+    "require_cell_size",
+    "require_density",
+    "require_one",
+    "require_thickness",
+    "sound_tolerance",
+    "whole_cells",
+]
 
 # In mm. The kernel takes lengths under 1e-7 mm for nothing; these keep every edge well above.
 SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
@@ -58,6 +66,33 @@ def require_density(density: float, cell_size: float) -> None:
     if thickness_of_density(density) * cell_size < THINNEST_WALL:
         thinnest = density_of_thickness(THINNEST_WALL / cell_size)
         raise ParameterError("density", density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
+
+
+def require_one(thickness: object, density: object) -> None:
+    """Refuse both or neither of thickness and density.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if (thickness is None) == (density is None):
+        given = {"thickness": thickness, "density": density}
+        raise ParameterError("thickness, density", given, "exactly one of the two")
+
+
+def sound_tolerance(tolerance: float) -> float:
+    """The largest deviation of a fit, in cell sizes.
+
+    Raises
+    ------
+    ParameterError
+        If it is not above 0 and below 1.
+    """
+    accepted = "a part of the cell size, a finite number above 0 and below 1"
+    number = finite_number("tolerance", tolerance, accepted)
+    if not 0 < number < 1:
+        raise ParameterError("tolerance", tolerance, accepted)
+    return number
 
 
 def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:

@@ -12,7 +12,7 @@ from math import prod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyroid_cad.arrays import freeze_arrays
+from gyroid_cad.arrays import dot, freeze_arrays
 from gyroid_cad.errors import ParameterError
 
 __all__ = [
@@ -231,8 +231,8 @@ class NurbsSurface:
         su, sv = d[1, 0], d[0, 1]
         cross = np.cross(su, sv)
         normal = cross / np.linalg.norm(cross, axis=-1, keepdims=True)
-        e, f, g = _dot(su, su), _dot(su, sv), _dot(sv, sv)
-        second_uu, second_uv, second_vv = _dot(d[2, 0], normal), _dot(d[1, 1], normal), _dot(d[0, 2], normal)
+        e, f, g = dot(su, su), dot(su, sv), dot(sv, sv)
+        second_uu, second_uv, second_vv = dot(d[2, 0], normal), dot(d[1, 1], normal), dot(d[0, 2], normal)
         return np.asarray((e * second_vv - 2 * f * second_uv + g * second_uu) / (2 * (e * g - f * f)))
 
     def quadrature(self) -> tuple[Floats, Floats, Floats]:
@@ -304,10 +304,6 @@ def grid_derivatives(
     numerator, numerator_u, numerator_v = (products(*pair, nets * weights[..., np.newaxis]) for pair in pairs)
     points = numerator / weight
     return points, (numerator_u - weight_u * points) / weight, (numerator_v - weight_v * points) / weight
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.sum(a * b, axis=-1))
 
 
 def _homogeneous(control_points: Floats, weights: Floats) -> Floats:

@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import dot
 from gyroid_cad.complex import CellComplex
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.exact_wall import laid_patches
@@ -182,8 +183,8 @@ def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Inte
         off = points - laid.points.reshape(*shape, 3)[:, np.newaxis] - np.stack([-half, half], axis=1)
         # The fitted faces' own normals: how far off they are, and how far along the exact normal they are met.
         outwards = _unit(np.cross(du, dv))
-        distance = _dot(off, outwards)
-        met = distance / _dot(outwards, normal[:, np.newaxis])
+        distance = dot(off, outwards)
+        met = distance / dot(outwards, normal[:, np.newaxis])
         middle = _unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
         sine = np.linalg.norm(np.cross(middle, normal), axis=-1)
         worst = np.maximum(worst, [_largest(distance), _largest((met[:, 1] - met[:, 0]) / thickness), _largest(sine)])
@@ -235,7 +236,3 @@ def _unit(vectors: Floats) -> Floats:
 
 def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values)))
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("...c,...c->...", a, b))

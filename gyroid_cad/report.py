@@ -35,7 +35,7 @@ class LatticeReport:
         Lines through the wall in which patches touch without joining.
     volume, volume_exact : float
         In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
-        where the lattice varies.
+        where the lattice varies; the latter none of a lattice that varies and is cut.
     max_deviation : float
         In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice varies.
     max_wall_error : float, optional
@@ -64,7 +64,7 @@ class LatticeReport:
     free_edges: int
     pinch_lines: int
     volume: float
-    volume_exact: float
+    volume_exact: float | None
     max_deviation: float
     max_wall_error: float | None
     max_normal_angle: float
@@ -76,14 +76,16 @@ class LatticeReport:
         return asdict(self)
 
 
-def report_of(built: Build, thickness: float, density: float, volume_exact: float) -> LatticeReport:
+def report_of(built: Build, thickness: float, density: float, volume_exact: float | None) -> LatticeReport:
     """The report on what was built and checked.
 
     Parameters
     ----------
     built : Build
-    thickness, density, volume_exact : float
+    thickness, density : float
         Of the exact lattice.
+    volume_exact : float, optional
+        Of the exact lattice, if it is known.
     """
     refit, complex = built.refit, built.complex
     with built.timed("fit report"):
@@ -96,14 +98,14 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
         thinnest=refit.thinnest if refit else thickness,
         thickest=refit.thickest if refit else thickness,
         density=density,
-        patches=complex.patch_count,
+        patches=built.patches,
         faces=built.topology.faces,
         solids=built.topology.solids,
         control_points=len(built.wall.weights),
         valid=built.valid(),
         closed=built.topology.closed,
-        free_edges=int(complex.free.sum()),
-        pinch_lines=complex.pinch_lines,
+        free_edges=0 if built.recipe.boxed else int(complex.free.sum()),
+        pinch_lines=0 if built.recipe.boxed else complex.pinch_lines,
         volume=built.volume,
         volume_exact=volume_exact,
         max_deviation=refit.max_deviation if refit else fit.max_distance * cell_size,

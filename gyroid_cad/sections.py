@@ -162,13 +162,11 @@ class Sections:
 
     def in_square(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
         """Places in the square, or their rate of change; shape (q, 2)."""
-        control = self.parameters[curve]
-        return np.asarray(basis(section_knots(len(control)), 3, t, derivative) @ control)
+        return _on_section(self.parameters[curve], t, derivative)
 
     def in_space(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
         """Points in mm, or their rate of change; shape (q, 3)."""
-        control = self.points[curve]
-        return np.asarray(basis(section_knots(len(control)), 3, t, derivative) @ control)
+        return _on_section(self.points[curve], t, derivative)
 
 
 @lru_cache
@@ -176,6 +174,16 @@ def section_knots(control_points: int) -> Floats:
     """Knots on [0, 1] of a cubic through as many evenly spaced stations, none at the second and last but one."""
     inner = np.linspace(0, 1, control_points)[2:-2]
     return np.concatenate([np.zeros(4), inner, np.ones(4)])
+
+
+def _on_section(control: Floats, t: Floats, derivative: int) -> Floats:
+    return np.asarray(_section_basis(len(control), np.asarray(t, float).tobytes(), derivative) @ control)
+
+
+@lru_cache(maxsize=256)
+def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
+    """Most curves are looked at in the same places: at evenly spread ones, or at Gauss points from end to end."""
+    return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
 
 
 def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:

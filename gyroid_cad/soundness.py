@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import dot
 from gyroid_cad.complex import CellComplex
 from gyroid_cad.errors import SoundnessError
 from gyroid_cad.exact_wall import differentiation_matrix, interpolation_matrix, laid_patches, sampled_place
@@ -223,12 +224,12 @@ class _Lookup:
         near = distance < np.maximum(self.reach[nearest], np.linalg.norm(offsets, axis=1))
         candidates = np.flatnonzero(near & (self.patch[samples] != self.patch[nearest]))
         first, second = samples[candidates], nearest[candidates]
-        across = _dot(places[candidates] - self.middle[second], self.half[second])
-        facing = _dot(offsets[candidates], self.half[second]) * across < 0
+        across = dot(places[candidates] - self.middle[second], self.half[second])
+        facing = dot(offsets[candidates], self.half[second]) * across < 0
         other = facing | ~self._neighbours(first, second)
         inside = other & (distance[candidates] < self.reach[second])
         apart = (self.middle[second] - self.middle[first])[inside]
-        side = np.sign(_dot(offsets[candidates], self.half[first]))[inside, np.newaxis]
+        side = np.sign(dot(offsets[candidates], self.half[first]))[inside, np.newaxis]
         factor = _meeting_factor(apart, side * self.half[first[inside]], self.reach[second[inside]])
         return (first[inside], factor), first[other & ~inside]
 
@@ -261,7 +262,7 @@ class _Lookup:
         # In steps of the grid, by least squares in the tangent plane.
         products = np.einsum("psc,ptc->pst", steps, steps)
         along = np.linalg.solve(products, np.einsum("psc,pc->ps", steps, apart)[..., np.newaxis])[..., 0]
-        height = _dot(apart, self.half[second]) / self.reach[second]
+        height = dot(apart, self.half[second]) / self.reach[second]
         # Beyond its border a patch goes on in its neighbour, or not at all.
         place = np.stack(np.divmod(second % CLEARANCE_SAMPLES**2, CLEARANCE_SAMPLES), axis=1)
         low = np.where(place == 0, _WITHIN_BORDER, -1.0)
@@ -277,9 +278,9 @@ class _Lookup:
 
 def _fold_factor(through: Floats, middle_u: Floats, half_u: Floats, middle_v: Floats, half_v: Floats) -> Floats:
     """Smallest |s| at which the area vector (M_u + s H_u) x (M_v + s H_v) has no part through the wall; inf if none."""
-    constant = _dot(np.cross(middle_u, middle_v), through)
-    linear = _dot(np.cross(middle_u, half_v) + np.cross(half_u, middle_v), through)
-    square = _dot(np.cross(half_u, half_v), through)
+    constant = dot(np.cross(middle_u, middle_v), through)
+    linear = dot(np.cross(middle_u, half_v) + np.cross(half_u, middle_v), through)
+    square = dot(np.cross(half_u, half_v), through)
     discriminant = linear * linear - 4 * constant * square
     with np.errstate(divide="ignore", invalid="ignore"):
         root = 2 * np.abs(constant) / (np.abs(linear) + np.sqrt(discriminant))
@@ -293,7 +294,7 @@ def _meeting_factor(apart: Floats, half: Floats, other_reach: Floats) -> Floats:
 
     That is where its tip does, |apart - s half| = s other_reach, unless the tip has passed the place before.
     """
-    squared, along, own = _dot(apart, apart), _dot(apart, half), _dot(half, half)
+    squared, along, own = dot(apart, apart), dot(apart, half), dot(half, half)
     foot = np.maximum(along / own, 0)
     aside = np.sqrt(np.maximum(squared - foot**2 * own, 0))
     discriminant = along * along - (own - other_reach**2) * squared
@@ -310,7 +311,3 @@ def _too_thick(complex: CellComplex, grading: Grading, worst: _Worst) -> Soundne
         return SoundnessError(name, asked, place, worst.factor * asked, worst.reason, unit=" mm")
     limit = density_of_thickness(worst.factor * thickness_of_density(asked))
     return SoundnessError(given_as("density", grading.density), asked, place, limit, worst.reason)
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("...c,...c->...", a, b))

@@ -24,13 +24,14 @@ def print_summary(summary: dict[str, Any]) -> None:
         The report's values, with ``files`` and ``seconds["total"]``.
     """
     nx, ny, nz = summary["cells"]
-    error = summary["volume"] / summary["volume_exact"] - 1
+    exact = summary["volume_exact"]
+    error = "" if exact is None else f", {summary['volume'] / exact - 1:+.1e} of the exact one"
     rows = [
         ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
         ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
         ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
         ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
-        ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
+        ("volume", f"{summary['volume']:.8g} mm3{error}"),
         ("deviation", _deviation(summary)),
         *([("checked", _checks(summary["samples_per_patch"]))] if summary["samples_per_patch"] else []),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
@@ -50,7 +51,12 @@ def print_fill(summary: dict[str, Any]) -> None:
     islands = f"{summary['islands']} left, {summary['dropped']} dropped"
     rows = [
         ("kind", f"{summary['kind']}, cells of {summary['cell_size']:g} mm, wall {summary['thickness']:.6g} mm"),
-        ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
+        *([] if summary["smallest_wall"] is None else [("smallest wall", f"{summary['smallest_wall']:.6g} mm")]),
+        *([] if summary["skin"] is None else [("skin", f"{summary['skin']:g} mm")]),
+        (
+            "solids, faces",
+            f"{summary['solids']}, {summary['faces']} (valid{' and closed' if summary['closed'] else ''})",
+        ),
         ("volume", f"{summary['volume']:.8g} mm3 of {summary['part_volume']:.8g}, density {summary['density']:.5f}"),
         ("surface", f"{summary['area']:.6g} mm2"),
         *([] if summary["mass"] is None else [("mass", f"{summary['mass']:.4g} g of {summary['part_mass']:.4g} g")]),

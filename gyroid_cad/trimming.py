@@ -205,8 +205,7 @@ class _Cutting:
         on_curves: list[list[tuple[float, int]]] = [[] for _ in curves]
         for index, curve in enumerate(curves):
             plane = int(self.sections.plane[curve])
-            others = [other for other, (axis, _) in enumerate(PLANES) if axis != PLANES[plane][0]]
-            for other, t in [(one, t) for one in others for t in self._crossings_of(curve, one)]:
+            for other, t in self._crossings_of(curve):
                 pair = (min(plane, other), max(plane, other))
                 place = self.sections.in_square(curve, np.array([t]))[0]
                 number = self._number_near(place, places, [edges[BOX, k, 0] == pair for k in range(len(places))])
@@ -230,20 +229,26 @@ class _Cutting:
     def _level(self, curve: int, plane: int) -> float:
         return float(self.faces.levels[self.sections.face[curve], plane])
 
-    def _crossings_of(self, curve: int, plane: int) -> list[float]:
-        """Parameters at which a section curve crosses another plane."""
-        level, axis = self._level(curve, plane), PLANES[plane][0]
-        if np.isnan(level):
-            return []
+    def _crossings_of(self, curve: int) -> list[tuple[int, float]]:
+        """Other planes that a section curve crosses, and its parameters there."""
+        levels = self.faces.levels[self.sections.face[curve]]
+        own = PLANES[self.sections.plane[curve]][0]
+        others = [k for k, (axis, _) in enumerate(PLANES) if axis != own and not np.isnan(levels[k])]
         t = np.linspace(0, 1, 4 * len(self.sections.points[curve]))
-        height = self.sections.in_space(curve, t)[:, axis] - level
-        before = np.flatnonzero((height[1:] > 0) != (height[:-1] > 0))
+        axes = [PLANES[k][0] for k in others]
+        height = self.sections.in_space(curve, t)[:, axes] - levels[others]
+        before, which = np.nonzero((height[1:] > 0) != (height[:-1] > 0))
+        if not len(before):
+            return []
+        axis, level = np.array(axes)[which], levels[others][which]
         low, high = t[before], t[before + 1]
-        root = low + (high - low) * height[before] / (height[before] - height[before + 1])
+        here, there = height[before, which], height[before + 1, which]
+        root = low + (high - low) * here / (here - there)
+        each = np.arange(len(root))
         for _ in range(_NEWTON_STEPS):
-            miss = self.sections.in_space(curve, root)[:, axis] - level
-            root = np.clip(root - miss / self.sections.in_space(curve, root, 1)[:, axis], low, high)
-        return [float(value) for value in root]
+            miss = self.sections.in_space(curve, root)[each, axis] - level
+            root = np.clip(root - miss / self.sections.in_space(curve, root, 1)[each, axis], low, high)
+        return [(others[k], float(value)) for k, value in zip(which.tolist(), root, strict=True)]
 
     def _arcs(self, face: int, curves: list[int], on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
         """All stretches of the square's sides and of the section curves, between the places where they meet."""

@@ -72,12 +72,12 @@ class Wall:
         weights = np.repeat(edge_row(self.weights, edge)[:, np.newaxis], 2, axis=1)
         return NurbsSurface(rows, weights, self.knots, np.array([0.0, 0.0, 1.0, 1.0]))
 
-    def volume(self) -> float:
-        """Volume in mm3, by Gauss quadrature of the Jacobian determinant over the ruled patches.
+    def volume(self, patches: Integers | None = None) -> float:
+        """Volume in mm3 of the wall, or of some of its patches, by Gauss quadrature of the Jacobian determinant.
 
         Exact to rounding for polynomial nets: no kernel is asked.
         """
-        uses = np.bincount(self.patch_net, minlength=len(self.nets))
+        uses = np.bincount(self.patch_net if patches is None else self.patch_net[patches], minlength=len(self.nets))
         return float(
             sum(
                 uses[first : first + _NETS_AT_ONCE]

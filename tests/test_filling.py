@@ -16,11 +16,14 @@ from scipy.spatial.transform import Rotation
 
 import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
-from gyroid_cad.filling import KINDS, Filled, _turn, fill, part_of
+from gyroid_cad.filled_part import Filling
+from gyroid_cad.filling import Filled, _turn, fill, part_of
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.lattice import Lattice
+from gyroid_cad.regions import KINDS
 from gyroid_cad.tube import density_of_thickness, thickness_of_density
 
 CELL, WALL, RADIUS = 10.0, 0.9, 2.2
@@ -46,7 +49,7 @@ def test_a_filled_part_is_closed_valid_and_what_its_report_says(kind: str, densi
     assert is_valid(made.solid())
     assert topology(made.solid()).closed
     assert (topology(made.solid()).solids, topology(made.solid()).faces) == (report.solids, report.faces)
-    assert measure(made.solid()) == pytest.approx((report.volume, report.area), rel=1e-9)
+    assert measure(made.solid()) == pytest.approx((report.volume, report.area), rel=1e-8)
     assert report.part_volume == pytest.approx(BALL, rel=1e-6)
     assert report.density == pytest.approx(report.volume / report.part_volume)
     assert report.mass == pytest.approx(2.7e-3 * report.volume)
@@ -108,6 +111,101 @@ def test_islands_are_counted_and_dropped_on_request() -> None:
     assert one.volume < both.volume
 
 
+def test_a_box_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    box = cq.Workplane().box(4, 5, 3).translate((5, 4, 6))
+    sections = fill(box, CELL, WALL, fit=COARSE).report
+    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill, box: self._by_booleans(infill))
+    booleans = fill(box, CELL, WALL, fit=COARSE).report
+    assert sections.by_sections
+    assert sections.volume == pytest.approx(booleans.volume, rel=1e-5)
+    assert sections.area == pytest.approx(booleans.area, rel=1e-5)
+    assert (sections.solids, sections.faces) == (booleans.solids, booleans.faces)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (20, 30, 40)])
+def test_the_wall_in_a_box_and_its_channels_are_the_whole_box_however_the_lattice_is_turned(turn: Any) -> None:
+    box = cq.Workplane().box(6, 7, 8)
+    both = [fill(box, CELL, WALL, kind=kind, rotation=turn, fit=COARSE).report for kind in ("sheet", "channels")]
+    assert sum(report.volume for report in both) == pytest.approx(6 * 7 * 8, rel=1e-6)
+
+
+def test_whole_cells_are_as_dense_as_was_asked_wherever_they_begin() -> None:
+    box = cq.Workplane().box(2 * CELL, CELL, CELL)
+    for origin in ((0, 0, 0), (1.1, 2.3, 4.7)):
+        assert fill(box, CELL, density=0.3, origin=origin).report.density == pytest.approx(0.3, rel=1e-6)
+
+
+@pytest.mark.parametrize("part", [ball(), cq.Workplane().box(4, 5, 3).translate((5, 4, 6))], ids=["ball", "box"])
+def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: cq.Workplane, tmp_path: Path) -> None:
+    surface, wall = fill(part, CELL, kind="surface", fit=COARSE), fill(part, CELL, 0.05, fit=COARSE)
+    report = surface.report
+    assert (report.volume, report.solids, report.smallest_wall, report.closed) == (0, 0, None, False)
+    # A thin wall is its mid-surface times its thickness.
+    assert report.area == pytest.approx(wall.report.volume / 0.05, rel=1e-3)
+    surface.write(tmp_path / "surface.step")
+    assert is_valid(read_step(tmp_path / "surface.step"))
+    with pytest.raises(ParameterError, match="the bare surface bounds no volume"):
+        surface.write(tmp_path / "surface.stl")
+
+
+def test_a_field_that_does_not_vary_is_a_number() -> None:
+    number, field = fill(ball(), CELL, WALL, fit=COARSE).report, fill(ball(), CELL, f"{WALL} + 0*x", fit=COARSE).report
+    assert field.volume == pytest.approx(number.volume, rel=1e-3)
+
+
+def test_a_field_is_of_places_in_the_part_and_turns_with_it() -> None:
+    # A quarter turn about z is a symmetry of nothing here: part, lattice and field are turned alike.
+    part = cq.Workplane().box(4, 5, 3).translate((5, 4, 6))
+    turned = part.rotate((0, 0, 0), (0, 0, 1), 90)
+    before = fill(part, CELL, "0.6 + 0.08*x", fit=COARSE).report
+    after = fill(turned, CELL, "0.6 + 0.08*y", rotation=(0, 0, 90), fit=COARSE).report
+    assert after.volume == pytest.approx(before.volume, rel=1e-6)
+    assert (before.smallest_wall, before.thickness) == pytest.approx((after.smallest_wall, after.thickness), rel=1e-6)
+    assert before.smallest_wall < before.thickness
+
+
+def test_a_wall_that_varies_and_the_channels_it_leaves_are_the_whole_part() -> None:
+    both = [fill(ball(), CELL, "0.7 + 0.05*z", kind=kind, fit=COARSE).report for kind in ("sheet", "channels")]
+    assert sum(report.volume for report in both) == pytest.approx(BALL, rel=1e-5)
+
+
+def test_a_block_of_cells_round_the_part_fills_it_as_an_endless_lattice_does() -> None:
+    block = fill(ball(), lattice=Lattice((1, 1, 1), CELL, WALL, fit=COARSE)).report
+    assert block.volume == pytest.approx(filled_straight().volume, rel=1e-6)
+    assert (block.solids, block.faces) == (filled_straight().solids, filled_straight().faces)
+
+
+@lru_cache(maxsize=1)
+def filled_straight() -> Any:
+    return fill(ball(), CELL, WALL, fit=COARSE).report
+
+
+def test_a_block_carried_by_a_map_ends_in_the_part_with_its_own_side_walls() -> None:
+    twisted = Lattice((1, 1, 1), CELL, WALL, map="twist:angle=20", tolerance=1e-3)
+    half = fill(ball(), lattice=twisted, origin=(5.0, 0, 0)).report
+    assert half.valid
+    assert half.closed
+    assert 0 < half.volume < 0.8 * filled_straight().volume
+
+
+def test_a_skin_is_kept_and_fused_with_what_fills_the_core() -> None:
+    skin = 0.4
+    inner = RADIUS - skin
+    core = cq.Workplane(origin=(5.0, 4.0, 6.0)).sphere(inner)
+    made, within = fill(ball(), CELL, WALL, fit=COARSE, skin=skin), fill(core, CELL, WALL, fit=COARSE)
+    assert made.report.solids == 1
+    assert made.report.volume == pytest.approx(BALL - 4 / 3 * np.pi * inner**3 + within.report.volume, rel=1e-4)
+    assert made.report.smallest_wall == skin
+    assert is_valid(made.solid())
+
+
+def test_channels_within_a_skin_are_those_of_the_core() -> None:
+    channels, wall = (
+        fill(ball(), CELL, WALL, kind=kind, fit=COARSE, skin=0.4).report for kind in ("channels", "sheet")
+    )
+    assert channels.volume + wall.volume == pytest.approx(BALL, rel=1e-4)
+
+
 def test_files_are_written_and_read_back(tmp_path: Path) -> None:
     filled().write(tmp_path / "light.step", tmp_path / "light.stl", deviation=0.1)
     shape = read_step(tmp_path / "light.step")
@@ -130,6 +228,18 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"thickness": 4.0}, "below 3.7647 mm"),
         ({"kind": "truss"}, " or ".join(KINDS)),
         ({"kind": "network-a"}, "the labyrinth's volume fraction"),
+        ({"kind": "network-a", "thickness": None, "density": "0.3 + 0.01*x"}, "one number above 0.02983"),
+        ({"kind": "surface"}, "thickness = 0.9: expected none: the bare surface has no wall"),
+        ({"kind": "surface", "thickness": None, "skin": 1}, "skin = 1: expected none round the bare surface"),
+        ({"thickness": "0.9 + 0.1*q"}, "thickness"),
+        ({"thickness": "1 - x"}, "at (x, y, z) = ("),
+        ({"skin": 0}, "skin = 0"),
+        ({"skin": 9}, "skin = 9"),
+        ({"openings": [">Z"]}, "none without a skin"),
+        ({"skin": 0.4, "openings": ["up"]}, "openings = 'up'"),
+        ({"skin": 0.4, "openings": [(50, 0, 0)]}, "a point on a face; the nearest is"),
+        ({"tolerance": 2}, "tolerance = 2"),
+        ({"lattice": Lattice((1, 1, 1), 10, 1)}, "cell_size = 10.0: expected none beside a lattice"),
         ({"kind": "network-a", "thickness": None, "density": 0.01}, "above 0.02983"),
         ({"origin": (0, 0)}, "origin = (0, 0): expected three finite numbers"),
         ({"rotation": 3}, "rotation = 3: expected three finite numbers"),

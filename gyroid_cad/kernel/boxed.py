@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from OCP.BRep import BRep_Builder
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.Geom import Geom_BSplineCurve, Geom_Plane
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d
 from OCP.TColgp import TColgp_Array1OfPnt2d
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.box_caps import Cap, plane_axes
 from gyroid_cad.box_cut import BoxEdge, BoxedWall, BoxFace
@@ -26,8 +26,8 @@ __all__ = ["realise_boxed"]
 _MARGIN = 2.0
 
 
-def realise_boxed(cut: BoxedWall) -> list[TopoDS_Solid]:
-    """Build the solids of a wall cut to a box.
+def realise_boxed(cut: BoxedWall) -> list[TopoDS_Shape]:
+    """Build the solids of a wall cut to a box, one for each of its components; or shells, if it has no caps.
 
     Parameters
     ----------
@@ -38,9 +38,12 @@ def realise_boxed(cut: BoxedWall) -> list[TopoDS_Solid]:
     KernelError
         If a piece of the boundary runs round nothing but a void.
     """
+    shells = _Realisation(cut).shells()
+    if not cut.capped:
+        return shells
     if any(volume <= 0 for volume in cut.volumes):
         raise KernelError("the box leaves a void of the lattice with nothing round it")
-    return _Realisation(cut).solids()
+    return [_solid(shell) for shell in shells]
 
 
 class _Realisation:
@@ -54,21 +57,16 @@ class _Realisation:
         self.vertices = [self._vertex(point.tolist()) for point in cut.points]
         self.edges = [self._edge(edge) for edge in cut.edges]
 
-    def solids(self) -> list[TopoDS_Solid]:
+    def shells(self) -> list[TopoDS_Shell]:
         shells = [TopoDS_Shell() for _ in self.cut.volumes]
         for shell in shells:
             self.builder.MakeShell(shell)
         faces = [self._face(face) for face in self.cut.faces] + [self._cap(cap) for cap in self.cut.caps]
         for face, component in zip(faces, self.cut.component.tolist(), strict=True):
             self.builder.Add(shells[component], face)
-        solids = []
         for shell in shells:
-            shell.Closed(True)
-            solid = TopoDS_Solid()
-            self.builder.MakeSolid(solid)
-            self.builder.Add(solid, shell)
-            solids.append(solid)
-        return solids
+            shell.Closed(self.cut.capped)
+        return shells
 
     def _plane(self, plane: int) -> Geom_Plane:
         box, (axis, sign) = self.cut.box, PLANES[plane]
@@ -94,8 +92,11 @@ class _Realisation:
             curve, _, tolerance = self._section(edge.sections, edge.curve)
             location = self.geometry.location(edge.patch)
         self.builder.MakeEdge(made, curve, location, tolerance)
-        for vertex in (start, end):
-            self.builder.UpdateVertex(vertex, tolerance)
+        for vertex, parameter in ((start, first), (end, last)):
+            place = curve.Value(parameter).Transformed(location.Transformation())
+            # Two curves that meet at a small angle are further apart there than each is from its face.
+            gap = _MARGIN * place.Distance(BRep_Tool.Pnt_s(vertex))
+            self.builder.UpdateVertex(vertex, max(tolerance, gap))
         self.builder.Add(made, start)
         self.builder.Add(made, end.Oriented(TopAbs_REVERSED))
         self.builder.Range(made, first, last)
@@ -152,3 +153,10 @@ class _Realisation:
             self.builder.Add(wire, self.edges[number] if forward else self.edges[number].Reversed())
         wire.Closed(True)
         return wire
+
+
+def _solid(shell: TopoDS_Shell) -> TopoDS_Solid:
+    builder, solid = BRep_Builder(), TopoDS_Solid()
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell)
+    return solid

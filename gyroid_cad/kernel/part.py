@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.GeomAbs import GeomAbs_Plane
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
-from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID, TopAbs_VERTEX
+from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
+from OCP.TopTools import TopTools_IndexedMapOfShape
 
+from gyroid_cad.box_cut import Box
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 
@@ -33,6 +38,9 @@ Booleans = NDArray[np.bool_]
 _DEFLECTION = 1e-3
 _ANGULAR_DEFLECTION = 0.5
 _CLASSIFYING_TOLERANCE = 1e-7
+_BOX_FACES, _BOX_CORNERS = 6, 8
+# How far from square a box may be, in radians and in parts of its largest extent.
+_SQUARE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +55,8 @@ class Part:
         Corners of the bounding box, in mm.
     volume : float
         In mm3.
+    box : Box, optional
+        If the part is one solid and that is a box.
     """
 
     shape: TopoDS_Shape
@@ -54,6 +64,7 @@ class Part:
     low: Floats
     high: Floats
     volume: float
+    box: Box | None = None
 
     def holds(self, points: Floats) -> Booleans:
         """Which points, shape (n, 3), lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
@@ -114,7 +125,33 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     corners = np.array(box.Get())
     divided = _without_seams(shape)
     solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, corners[:3], corners[3:], sum(volumes))
+    return Part(divided, solids, corners[:3], corners[3:], sum(volumes), _box_of(solids))
+
+
+def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
+    """The box that the solids are, if they are one box: six planes, and eight corners where a box has them."""
+    if len(solids) != 1:
+        return None
+    faces = [TopoDS.Face_s(face) for face in parts_of(solids[0], TopAbs_FACE)]
+    if len(faces) != _BOX_FACES or any(BRepAdaptor_Surface(face).GetType() != GeomAbs_Plane for face in faces):
+        return None
+    corners = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(solids[0], TopAbs_VERTEX, corners)
+    places = (BRep_Tool.Pnt_s(TopoDS.Vertex_s(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
+    points = np.array([(place.X(), place.Y(), place.Z()) for place in places])
+    normals = [BRepAdaptor_Surface(face).Plane().Axis().Direction() for face in faces]
+    directions = np.array([(normal.X(), normal.Y(), normal.Z()) for normal in normals])
+    first = directions[0]
+    across = [direction for direction in directions if abs(direction @ first) < _SQUARE]
+    if len(points) != _BOX_CORNERS or not across:
+        return None
+    axes = np.stack([first, across[0], np.cross(first, across[0])], axis=1)
+    along = points @ axes
+    low, high = along.min(axis=0), along.max(axis=0)
+    size = float(np.max(high - low))
+    ends = np.minimum(np.abs(along - low), np.abs(along - high))
+    upper = {tuple(row) for row in (along > (low + high) / 2).tolist()}
+    return Box(axes, low, high) if ends.max() < _SQUARE * size and len(upper) == _BOX_CORNERS else None
 
 
 def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:

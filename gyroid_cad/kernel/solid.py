@@ -31,7 +31,7 @@ from gyroid_cad.kernel.surfaces import kernel_curve
 from gyroid_cad.nurbs import NurbsCurve
 from gyroid_cad.wall import SIDES, Wall
 
-__all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise", "realise_faces"]
+__all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise", "realise_faces", "realise_patches"]
 
 KernelShape = TopoDS_Shape
 
@@ -71,6 +71,11 @@ def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
     return _Realisation(wall).faces()
 
 
+def realise_patches(wall: Wall) -> list[list[TopoDS_Face]]:
+    """All faces of every patch of a closed wall, its free side walls too, oriented outwards and sharing their edges."""
+    return _Realisation(wall).patches()
+
+
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
     """The same topology and geometry under a handle of its own: moving one does not move the other."""
     twin = shape.Located(TopLoc_Location())
@@ -86,6 +91,7 @@ class _Realisation:
         self.builder = BRep_Builder()
         self.identity = TopLoc_Location()
         self.geometry = WallGeometry(wall)
+        self.free = self.complex.free.tolist()
         self.patch_edges = self.complex.patch_edges.tolist()
         self.patch_fans = self.complex.patch_fans.tolist()
         self.edge_forward = self.complex.edge_forward.tolist()
@@ -97,19 +103,29 @@ class _Realisation:
         self.edges = self._make_edges()
         self.posts = self._make_posts()
         shells = [self._new_shell() for _ in range(self.complex.component_count)]
-        free = self.complex.free.tolist()
         component = self.complex.patch_component.tolist()
         for patch in range(self.complex.patch_count):
             shell = shells[component[patch]]
-            self.builder.Add(shell, self._make_face(patch, 0).Oriented(TopAbs_REVERSED))
-            self.builder.Add(shell, self._make_face(patch, 1))
-            for k in range(4):
-                if free[self.patch_edges[patch][k]]:
-                    self.builder.Add(shell, self._make_side_wall(patch, k))
+            for face in self._patch_faces(patch):
+                self.builder.Add(shell, face)
             if patch % 240 == 0:
                 progress(patch, self.complex.patch_count)
         progress(self.complex.patch_count, self.complex.patch_count)
         return self._solids(shells)
+
+    def patches(self) -> list[list[TopoDS_Face]]:
+        self.vertices = self._make_vertices()
+        self.edges = self._make_edges()
+        self.posts = self._make_posts()
+        return [self._patch_faces(patch) for patch in range(self.complex.patch_count)]
+
+    def _patch_faces(self, patch: int) -> list[TopoDS_Face]:
+        sides = [k for k in range(4) if self.free[self.patch_edges[patch][k]]]
+        return [
+            TopoDS.Face_s(self._make_face(patch, 0).Oriented(TopAbs_REVERSED)),
+            self._make_face(patch, 1),
+            *(self._make_side_wall(patch, k) for k in sides),
+        ]
 
     def faces(self) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
         self.vertices = self._make_vertices()

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.Bnd import Bnd_Box
 from OCP.BOPAlgo import BOPAlgo_Builder
-from OCP.BOPTools import BOPTools_AlgoTools3D
+from OCP.BOPTools import BOPTools_AlgoTools, BOPTools_AlgoTools3D
 from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_Context
@@ -35,9 +37,20 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.part import Part
 
-__all__ = ["Pieces", "bounded_solids", "compound_of", "split"]
+__all__ = [
+    "Pieces",
+    "bounded_solids",
+    "compound_of",
+    "images",
+    "inner_point",
+    "inner_sides",
+    "shells_of",
+    "solids_of",
+    "split",
+]
 
 Floats = NDArray[np.float64]
+Change = tuple[TopoDS_Shape, tuple[TopoDS_Shape, ...]]
 
 _CLASSIFYING_TOLERANCE = 1e-7
 _BOTH_WAYS = {TopAbs_FORWARD, TopAbs_REVERSED}
@@ -53,10 +66,17 @@ class Pieces:
         Pieces of the faces that lie in the part, oriented as the faces were.
     boundary : tuple of TopoDS_Face
         Pieces of the part's boundary, oriented outwards.
+    origins : tuple of int
+        For each piece of the boundary, which face of the part it is of, as they are found in the part's shape.
+    changed : tuple of (TopoDS_Shape, tuple of TopoDS_Shape)
+        Edges and vertices of the part that were split or made anew, forward, and what they have become; the pieces of
+        an edge run the way it does.
     """
 
     inside: tuple[TopoDS_Face, ...]
     boundary: tuple[TopoDS_Face, ...]
+    origins: tuple[int, ...] = ()
+    changed: tuple[Change, ...] = ()
 
 
 def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
@@ -75,7 +95,7 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     """
     boundary = [TopoDS.Face_s(face) for face in parts_of(part.shape, TopAbs_FACE)]
     if not faces:
-        return Pieces((), tuple(boundary))
+        return Pieces((), tuple(boundary), tuple(range(len(boundary))))
     fuse = BOPAlgo_Builder()
     fuse.SetNonDestructive(True)
     fuse.AddArgument(part.shape)
@@ -89,10 +109,16 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     inside = [
         piece
         for face in faces
-        for piece in _images(fuse, face)
+        for piece in images(fuse, face)
         if any(_lies_in(piece, classifier, context) for classifier in classifiers)
     ]
-    return Pieces(tuple(inside), tuple(piece for face in boundary for piece in _images(fuse, face)))
+    pieces = [(piece, index) for index, face in enumerate(boundary) for piece in images(fuse, face)]
+    return Pieces(
+        tuple(TopoDS.Face_s(piece) for piece in inside),
+        tuple(TopoDS.Face_s(piece) for piece, _ in pieces),
+        tuple(index for _, index in pieces),
+        _changed(fuse, part.shape),
+    )
 
 
 def bounded_solids(
@@ -119,12 +145,85 @@ def bounded_solids(
     KernelError
         If the faces do not close, or do not agree on what is inside.
     """
-    faces = [*pieces.inside, *map(TopoDS.Face_s, whole), *_inner_boundary(pieces, wanted_at)]
+    boundary = zip(pieces.boundary, inner_sides(pieces, wanted_at), strict=True)
+    return solids_of([*pieces.inside, *map(TopoDS.Face_s, whole), *(piece for piece, inner in boundary if inner)])
+
+
+def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
+    """The solids that faces bound which share their edges, outer shells with the voids in them.
+
+    Parameters
+    ----------
+    faces : sequence of TopoDS_Face
+        Oriented out of the solids.
+
+    Raises
+    ------
+    KernelError
+        If an edge is not shared by exactly two of the faces, which run through it in opposite ways.
+    """
     users = _users(faces)
     if any({use.orientation for use in uses} != _BOTH_WAYS or len(uses) != 2 for uses in users):
         raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
     shells = [_shell([faces[index] for index in group]) for group in _connected(len(faces), users)]
     return _solids(shells)
+
+
+def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
+    """Faces in shells that hang together by edges, closed or not.
+
+    Parameters
+    ----------
+    faces : sequence of TopoDS_Face
+        Oriented alike.
+    """
+    users = _users(faces)
+    groups = _connected(len(faces), users)
+    opened = {use.face for uses in users for use in uses if len(uses) != 2}
+    return [_shell([faces[index] for index in group], opened.isdisjoint(group)) for group in groups]
+
+
+def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[bool]:
+    """Which pieces of the part's boundary lie on the inner side of the lattice faces they meet.
+
+    Two faces of a solid run through their common edge in opposite ways: so a piece of the boundary is wanted if it
+    runs against the lattice face along the edge they share. Across the part's own edges nothing changes.
+
+    Parameters
+    ----------
+    pieces : Pieces
+    wanted_at : callable
+        As of :func:`bounded_solids`.
+
+    Returns
+    -------
+    list of bool
+        One for each piece of the boundary.
+
+    Raises
+    ------
+    KernelError
+        If the faces do not agree on what is inside.
+    """
+    count = len(pieces.inside)
+    wanted: dict[int, bool] = {}
+    beside: dict[int, set[int]] = {}
+    for uses in _users([*pieces.inside, *pieces.boundary]):
+        cuts = [use for use in uses if use.face < count]
+        borders = [use for use in uses if use.face >= count]
+        if len(cuts) == 1:
+            for use in borders:
+                _decide(wanted, use.face, use.orientation != cuts[0].orientation)
+        elif not cuts:
+            for use in borders:
+                beside.setdefault(use.face, set()).update(other.face for other in borders)
+    _spread(wanted, list(wanted), beside)
+    for index, piece in enumerate(pieces.boundary, count):
+        if index not in wanted:
+            point = inner_point(piece, IntTools_Context())
+            wanted[index] = wanted_at(np.array([point.X(), point.Y(), point.Z()]))
+            _spread(wanted, [index], beside)
+    return [wanted[index] for index in range(count, count + len(pieces.boundary))]
 
 
 def compound_of(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
@@ -142,32 +241,6 @@ class _Use:
 
     face: int
     orientation: TopAbs_Orientation
-
-
-def _inner_boundary(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[TopoDS_Face]:
-    """Pieces of the part's boundary on the inner side of the lattice faces they meet.
-
-    Two faces of a solid run through their common edge in opposite ways: so a piece of the boundary is wanted if it
-    runs against the lattice face along the edge they share. Across the part's own edges nothing changes.
-    """
-    count = len(pieces.inside)
-    wanted: dict[int, bool] = {}
-    beside: dict[int, set[int]] = {}
-    for uses in _users([*pieces.inside, *pieces.boundary]):
-        cuts = [use for use in uses if use.face < count]
-        borders = [use for use in uses if use.face >= count]
-        if len(cuts) == 1:
-            for use in borders:
-                _decide(wanted, use.face, use.orientation != cuts[0].orientation)
-        elif not cuts:
-            for use in borders:
-                beside.setdefault(use.face, set()).update(other.face for other in borders)
-    _spread(wanted, list(wanted), beside)
-    for index, piece in enumerate(pieces.boundary, count):
-        if index not in wanted:
-            wanted[index] = wanted_at(_place_on(piece))
-            _spread(wanted, [index], beside)
-    return [piece for index, piece in enumerate(pieces.boundary, count) if wanted.get(index)]
 
 
 def _spread(wanted: dict[int, bool], reached: list[int], beside: dict[int, set[int]]) -> None:
@@ -221,57 +294,87 @@ def _connected(count: int, users: list[list[_Use]]) -> list[list[int]]:
     return groups
 
 
-def _shell(faces: Iterable[TopoDS_Face]) -> TopoDS_Shell:
+def _shell(faces: Iterable[TopoDS_Face], closed: bool = True) -> TopoDS_Shell:
     builder, shell = BRep_Builder(), TopoDS_Shell()
     builder.MakeShell(shell)
     for face in faces:
         builder.Add(shell, face)
-    shell.Closed(True)
+    shell.Closed(closed)
     return shell
 
 
 def _solids(shells: Sequence[TopoDS_Shell]) -> list[TopoDS_Solid]:
     """Outer shells as solids, with the voids that lie in them."""
-    builder = BRep_Builder()
-    outer: list[tuple[TopoDS_Solid, TopoDS_Shell]] = []
-    voids: list[tuple[TopoDS_Solid, TopoDS_Shell]] = []
+    builder, context = BRep_Builder(), IntTools_Context()
+    outer: list[tuple[TopoDS_Solid, BRepClass3d_SolidClassifier]] = []
+    voids: list[TopoDS_Shell] = []
     for shell in shells:
         solid = TopoDS_Solid()
         builder.MakeSolid(solid)
         builder.Add(solid, shell)
         classifier = BRepClass3d_SolidClassifier(solid)
         classifier.PerformInfinitePoint(_CLASSIFYING_TOLERANCE)
-        (voids if classifier.State() == TopAbs_IN else outer).append((solid, shell))
-    for _, shell in voids:
-        vertex = BRep_Tool.Pnt_s(TopoDS.Vertex_s(next(parts_of(shell, TopAbs_VERTEX))))
-        for solid, _ in outer:
-            classifier = BRepClass3d_SolidClassifier(solid)
-            classifier.Perform(vertex, _CLASSIFYING_TOLERANCE)
-            if classifier.State() == TopAbs_IN:
-                builder.Add(solid, shell)
-                break
+        if classifier.State() == TopAbs_IN:
+            voids.append(shell)
         else:
+            outer.append((solid, classifier))
+    # Solids before voids are added: of those round a void, which lie in each other's voids, the smallest is its own.
+    round_void = [
+        [solid for solid, classifier in outer if _lies_in(next(parts_of(shell, TopAbs_FACE)), classifier, context)]
+        for shell in voids
+    ]
+    for shell, solids in zip(voids, round_void, strict=True):
+        if not solids:
             raise KernelError("a void of the filled part lies in none of its solids")
+        builder.Add(solids[0] if len(solids) == 1 else min(solids, key=_extent), shell)
     return [solid for solid, _ in outer]
 
 
-def _images(fuse: BOPAlgo_Builder, face: TopoDS_Shape) -> list[TopoDS_Face]:
-    if fuse.IsDeleted(face):
+def _extent(shape: TopoDS_Shape) -> float:
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box)
+    return float(box.SquareExtent())
+
+
+def images(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """What a shape has become in the kernel's general fuse: itself, if nothing crossed it."""
+    if fuse.IsDeleted(shape):
         return []
-    return [TopoDS.Face_s(image) for image in fuse.Modified(face)] or [TopoDS.Face_s(face)]
+    return list(fuse.Modified(shape)) or [shape]
 
 
-def _lies_in(face: TopoDS_Face, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
-    classifier.Perform(_inner_point(face, context), _CLASSIFYING_TOLERANCE)
+def _changed(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> tuple[Change, ...]:
+    context = IntTools_Context()
+    parts = TopTools_IndexedMapOfShape()
+    for kind in (TopAbs_EDGE, TopAbs_VERTEX):
+        for part in parts_of(shape, kind):
+            parts.Add(part.Oriented(TopAbs_FORWARD))
+    changed = []
+    for number in range(1, parts.Extent() + 1):
+        pieces = tuple(
+            _running_like(parts.FindKey(number), piece, context) for piece in fuse.Modified(parts.FindKey(number))
+        )
+        if pieces:
+            changed.append((parts.FindKey(number), pieces))
+    return tuple(changed)
+
+
+def _running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Context) -> TopoDS_Shape:
+    """The piece of an edge the way the edge runs; the kernel hands it out the way it was met first."""
+    forward = piece.Oriented(TopAbs_FORWARD)
+    if whole.ShapeType() != TopAbs_EDGE:
+        return forward
+    backwards = BOPTools_AlgoTools.IsSplitToReverse_s(TopoDS.Edge_s(forward), TopoDS.Edge_s(whole), context, 0)
+    return forward.Reversed() if backwards else forward
+
+
+def _lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
+    classifier.Perform(inner_point(TopoDS.Face_s(face), context), _CLASSIFYING_TOLERANCE)
     return bool(classifier.State() == TopAbs_IN)
 
 
-def _place_on(face: TopoDS_Face) -> Floats:
-    point = _inner_point(face, IntTools_Context())
-    return np.array([point.X(), point.Y(), point.Z()])
-
-
-def _inner_point(face: TopoDS_Face, context: IntTools_Context) -> gp_Pnt:
+def inner_point(face: TopoDS_Face, context: IntTools_Context) -> gp_Pnt:
+    """A point on a face and not on its edges."""
     place, parameters = gp_Pnt(), gp_Pnt2d()
     BOPTools_AlgoTools3D.PointInFace_s(face, place, parameters, context)
     return place

@@ -1,0 +1,198 @@
+"""Parts filled with gyroid: boxes of whole cells against the kernel's booleans, and volumes against ray casting.
+
+One period: ours, checks and all, against the kernel's boolean of the same box and a shell thickened by its simple
+offset. Five cells a side: against its boolean of the box and our own untrimmed lattice. Ten: what the time and memory
+grow by; each of these in a process of its own, by the processor time of the filling alone. A ball and a bracket read
+from STEP: the volume against columns of points, the part's inside told by rays through a fine mesh of it, the wall by
+distance to dense samples of the exact surface; no boolean is asked.
+
+Run: ``python -m benchmarks.filling [--quick]``
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+from OCP.gp import gp_Pnt
+from OCP.TopoDS import TopoDS_Shape
+
+from benchmarks.memory import peak
+from benchmarks.solid_against_thickening import copies, thickened
+from benchmarks.subject import CELL_SIZE, THICKNESS, kernel_volume, sewn
+from benchmarks.timing import Row, best_in_turn, fresh_python, plain_table, print_verdicts
+from gyroid_cad.complex import build_complex
+from gyroid_cad.covering import Frame, covering_complex, nearest_offsets
+from gyroid_cad.exact_wall import patch_points_and_normals
+from gyroid_cad.filling import fill
+from gyroid_cad.fit import fit_patch
+from gyroid_cad.kernel.solid import realise
+from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.tube import density_of_thickness, thickness_of_density
+from gyroid_cad.wall import build_wall
+
+__all__ = ["main"]
+
+Floats = NDArray[np.float64]
+
+# The open request at another project: 5 x 5 x 5 cells of 7 mm at density 0.30.
+SIZE, DENSITY = 7.0, 0.30
+_COLUMNS = 200
+_MESH = 2e-3
+_DENSE = 49
+
+
+def main(arguments: Sequence[str] = ()) -> bool:
+    """Print the tables; returns whether every requirement is met."""
+    parser = argparse.ArgumentParser(description="Fill boxes, a ball and a bracket.")
+    parser.add_argument("--quick", action="store_true", help="leave out what takes minutes")
+    quick = parser.parse_args(arguments).quick
+    rows = [*_one_period(), *([] if quick else _many_cells())]
+    passed = print_verdicts("Boxes", rows)
+    return print_verdicts("Free forms", _free_forms(quick)) and passed
+
+
+def _one_period() -> list[Row]:
+    """The box of one period in the middle of 2 x 2 x 2 cells."""
+    shell = thickened(sewn(copies(2)))
+    box = _box(0.5 * CELL_SIZE, 1.5 * CELL_SIZE)
+    (ours, made), (theirs, common) = best_in_turn(
+        2, lambda: fill(box, CELL_SIZE, THICKNESS), lambda: BRepAlgoAPI_Common(shell, box).Shape()
+    )
+    exact = density_of_thickness(THICKNESS / CELL_SIZE) * CELL_SIZE**3
+    return [
+        Row("one period: simple offset, cut / ours", theirs / ours, 5, unit="x", at_least=True),
+        Row("  ours: volume off the tube formula", abs(made.report.volume / exact - 1), 1e-4),
+        Row("  theirs: volume off the tube formula", abs(abs(kernel_volume(common)) / exact - 1)),
+    ]
+
+
+def _many_cells() -> list[Row]:
+    boolean, five, ten = (_alone(what) for what in ("boolean", "5", "10"))
+    headings = ("", "processor time", "peak memory", "faces", "density")
+    lines = [
+        (name, f"{some['seconds']:.1f} s", f"{some['peak'] / 1e9:.2f} GB", f"{some['faces']}", f"{some['density']:.6f}")
+        for name, some in (("5³, one boolean", boolean), ("5³, ours", five), ("10³, ours", ten))
+    ]
+    plain_table(f"Cells of {SIZE:g} mm at density {DENSITY}", headings, lines)
+    return [
+        Row("5³: one boolean / ours", boolean["seconds"] / five["seconds"], 3, 8, "x", at_least=True),
+        Row("5³: density off by", abs(five["density"] - DENSITY), 2e-4),
+        Row("5³: peak memory", five["peak"] / 1e9, 2, unit=" GB"),
+        Row("10³ / 5³: time", ten["seconds"] / five["seconds"], 8, 4, "x"),
+    ]
+
+
+def _alone(what: str) -> dict[str, float]:
+    result: dict[str, float] = json.loads(fresh_python("-m", "benchmarks.filling", "--alone", what))
+    return result
+
+
+def _run_alone(what: str) -> None:
+    """Fill, or cut by one boolean, and print what it took."""
+    cells = 5 if what == "boolean" else int(what)
+    low, high = 0.5 * SIZE, (cells + 0.5) * SIZE
+    box = _box(low, high)
+    if what == "boolean":
+        from gyroid_cad.kernel.check import topology
+
+        thickness = float(thickness_of_density(DENSITY)) * SIZE
+        lattice = realise(build_wall(build_complex((cells + 1,) * 3), fit_patch(), SIZE, thickness))
+        start = time.process_time()
+        shape = BRepAlgoAPI_Common(lattice, box).Shape()
+        seconds, faces = time.process_time() - start, topology(shape).faces
+        density = kernel_volume(shape) / (high - low) ** 3
+    else:
+        fill(_box(0.0, 2.0), SIZE, density=DENSITY)
+        start = time.process_time()
+        report = fill(box, SIZE, density=DENSITY).report
+        seconds, faces, density = time.process_time() - start, report.faces, report.density
+    print(json.dumps({"seconds": seconds, "peak": peak(), "faces": faces, "density": density}))
+
+
+def _free_forms(quick: bool) -> list[Row]:
+    ball = BRepPrimAPI_MakeSphere(gp_Pnt(1.0, 2.0, 3.0), 7.0 if quick else 12.0).Shape()
+    rows = _against_columns("ball", ball)
+    if not quick:
+        from examples.light_bracket import bracket
+
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "bracket.step"
+            write_step(bracket().val().wrapped, path)
+            rows += _against_columns("bracket from STEP", read_step(path))
+    return rows
+
+
+def _against_columns(name: str, part: TopoDS_Shape) -> list[Row]:
+    report = fill(part, SIZE, density=DENSITY).report
+    thickness = float(thickness_of_density(DENSITY)) * SIZE
+    expected = _volume_by_columns(part, thickness)
+    remark = f"{report.faces} faces, {report.solids} solids, {sum(report.seconds.values()):.0f} s"
+    return [
+        Row(f"{name}: volume off the columns'", abs(report.volume / expected - 1), 1e-3, remark=remark),
+        Row(f"{name}: solids besides the islands", report.solids - report.islands, 1),
+    ]
+
+
+def _volume_by_columns(part: TopoDS_Shape, thickness: float) -> float:
+    """Volume of the wall in a part: points at random places of the cells of a grid, along rays through a mesh."""
+    triangles = _mesh(part)
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    step = float((high - low).max()) / _COLUMNS
+    random = np.random.default_rng(0)
+    along = [np.arange(low[axis], high[axis], step) for axis in range(3)]
+    cell = covering_complex(np.zeros(3), np.full(3, SIZE), Frame(np.zeros(3), np.eye(3)), SIZE, 0.0)
+    places, normals = patch_points_and_normals(cell, SIZE, np.linspace(-1, 1, _DENSE))
+    hits = 0
+    for y in along[1]:
+        near = triangles[(triangles[:, :, 1].min(axis=1) <= y + step) & (triangles[:, :, 1].max(axis=1) >= y)]
+        points = []
+        for z in along[2]:
+            at = np.array([y, z]) + step * random.random(2)
+            x = along[0] + step * random.random(len(along[0]))
+            inside = np.sum(_crossings(near, at)[:, np.newaxis] < x, axis=0) % 2 == 1
+            points.append(np.column_stack([x[inside], np.broadcast_to(at, (int(inside.sum()), 2))]))
+        some = np.mod(np.concatenate(points), SIZE)
+        if len(some):
+            hits += int(np.sum(np.abs(nearest_offsets(places, normals, some)[0]) < thickness / 2))
+    return hits * step**3
+
+
+def _crossings(triangles: Floats, at: Floats) -> Floats:
+    """Where a ray along x at (y, z) goes through triangles, shape (n, 3, 3)."""
+    corners = triangles[:, :, 1:] - at
+    following = np.roll(corners, -1, axis=1)
+    areas = corners[..., 0] * following[..., 1] - corners[..., 1] * following[..., 0]
+    through = np.all(areas > 0, axis=1) | np.all(areas < 0, axis=1)
+    # Side k runs from corner k to corner k + 1: its area is the share of the corner after those.
+    shares = areas[through]
+    x = np.roll(triangles[through][:, :, 0], -2, axis=1)
+    return np.asarray(np.sum(shares * x, axis=1) / shares.sum(axis=1))
+
+
+def _mesh(part: TopoDS_Shape) -> Floats:
+    """A fine mesh's triangles; shape (n, 3, 3)."""
+    import cadquery as cq
+
+    vertices, triangles = cq.Shape.cast(part).tessellate(_MESH, 0.02)
+    return np.array([vertex.toTuple() for vertex in vertices])[np.array(triangles)]
+
+
+def _box(low: float, high: float) -> TopoDS_Shape:
+    return BRepPrimAPI_MakeBox(gp_Pnt(low, low, low), gp_Pnt(high, high, high)).Shape()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--alone"]:
+        _run_alone(sys.argv[2])
+    else:
+        sys.exit(not main(sys.argv[1:]))

@@ -1,0 +1,178 @@
+"""How deep places in a solid lie below its faces, and whether what is left inside a skin lies as deep as it should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.Bnd import Bnd_Box
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepTools import BRepTools
+from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.IntTools import IntTools_Context
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_OUT, TopAbs_State
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.part import measure
+from gyroid_cad.kernel.split import inner_point
+
+__all__ = ["Depths", "Faces", "points_on"]
+
+Floats = NDArray[np.float64]
+
+_CLASSIFYING_TOLERANCE = 1e-7
+_POINTS_INSIDE, _POINTS_ON_FACE, _BATCHES = 200, 12, 32
+# Of the thickness of a skin: how thin it may be anywhere, and how thick where its inner faces meet at sharp edges.
+_THINNEST, _THICKEST = 0.99, 2.02
+# Of the thickness of a skin: points so near an opening lie on it.
+_ON_OPENING = 1e-4
+# The search for the deepest place: how many places are followed, how many tries each, how often, and how far at first.
+_FOLLOWED, _TRIES, _ROUNDS, _REACH = 6, 24, 5, 0.4
+# What is so much deeper than asked for need not be known better.
+_ENOUGH = 1.2
+
+
+class Faces:
+    """Faces that points are away from.
+
+    Parameters
+    ----------
+    faces : iterable of TopoDS_Shape
+    """
+
+    def __init__(self, faces: Iterable[TopoDS_Shape]) -> None:
+        self._faces = list(faces)
+        corners = []
+        for face in self._faces:
+            box = Bnd_Box()
+            BRepBndLib.Add_s(face, box)
+            corners.append(box.Get())
+        self._corners = np.array(corners).reshape(-1, 6)
+
+    def __bool__(self) -> bool:
+        return bool(self._faces)
+
+    def distance(self, point: Floats) -> float:
+        """Of a point, shape (3,), from the nearest of them, in mm; infinite if there are none."""
+        away = np.maximum(np.maximum(self._corners[:, :3] - point, point - self._corners[:, 3:]), 0)
+        at_least = np.linalg.norm(away, axis=1)
+        vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
+        nearest = np.inf
+        for index in np.argsort(at_least).tolist():
+            if at_least[index] >= nearest:
+                break
+            found = BRepExtrema_DistShapeShape(vertex, self._faces[index])
+            if found.IsDone():
+                nearest = min(nearest, found.Value())
+        return float(nearest)
+
+    def distances(self, points: Floats) -> Floats:
+        """Of points, shape (n, 3); shape (n,)."""
+        return np.array([self.distance(point) for point in points])
+
+
+class Depths:
+    """How deep places in a solid lie below those of its faces that are no openings.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+    openings : sequence of TopoDS_Face
+        Of its faces.
+    """
+
+    def __init__(self, solid: TopoDS_Solid, openings: Sequence[TopoDS_Face]) -> None:
+        self._solid, self._openings = solid, list(openings)
+        faces = parts_of(solid, TopAbs_FACE)
+        self.kept = Faces(face for face in faces if not any(face.IsSame(opening) for opening in openings))
+        self.opened = Faces(openings)
+        self._random = np.random.default_rng(0)
+
+    def deepest(self, enough: float) -> float:
+        """About how deep the deepest place lies, in mm; or how deep one does that is well deeper than is enough."""
+        points, depths = self._inside
+        for reach in _REACH * 0.5 ** np.arange(_ROUNDS):
+            if len(depths) == 0 or depths.max() > _ENOUGH * enough:
+                break
+            best = np.argsort(depths)[-_FOLLOWED:]
+            steps = self._random.normal(size=(_TRIES, len(best), 3)) * (reach * depths[best])[:, np.newaxis]
+            tried = (points[best] + steps).reshape(-1, 3)
+            tried = tried[self._held(tried)]
+            points = np.concatenate([points[best], tried])
+            depths = np.concatenate([depths[best], self.kept.distances(tried)])
+        return float(depths.max(initial=0.0))
+
+    def confirm(self, core: Sequence[TopoDS_Solid], skin: float) -> bool:
+        """Whether solids are closed, valid, and what is left of this one less a skin, as far as points tell."""
+        if not core or any(measure(one)[0] <= 0 or not is_valid(one) or not topology(one).closed for one in core):
+            return False
+        least, most = _THINNEST * skin, _THICKEST * skin
+        states = [BRepClass3d_SolidClassifier(one) for one in core]
+
+        def state_in_core(point: Floats) -> list[TopAbs_State]:
+            return [_state(classifier, point) for classifier in states]
+
+        points, depths = self._inside
+        for point, depth in zip(points, depths.tolist(), strict=True):
+            if (depth < least or depth > most) and (TopAbs_IN in state_in_core(point)) != (depth > most):
+                return False
+        for face in self._openings:
+            points = points_on(face, _POINTS_ON_FACE)
+            for point in points[self.kept.distances(points) > most]:
+                if all(state == TopAbs_OUT for state in state_in_core(point)):
+                    return False
+        faces = (face for one in core for face in parts_of(one, TopAbs_FACE))
+        return all(self._as_deep(TopoDS.Face_s(face), skin) for face in faces)
+
+    def _as_deep(self, face: TopoDS_Face, skin: float) -> bool:
+        classifier = BRepClass3d_SolidClassifier(self._solid)
+        for point in points_on(face, _POINTS_ON_FACE):
+            depth = self.kept.distance(point)
+            if depth < _THINNEST * skin:
+                return False
+            if self.opened.distance(point) > _ON_OPENING * skin and (
+                depth > _THICKEST * skin or _state(classifier, point) != TopAbs_IN
+            ):
+                return False
+        return True
+
+    @cached_property
+    def _inside(self) -> tuple[Floats, Floats]:
+        """Points all over the solid, shape (n, 3), and their depths."""
+        box = Bnd_Box()
+        BRepBndLib.Add_s(self._solid, box)
+        corners = np.array(box.Get())
+        found: list[Floats] = []
+        for _ in range(_BATCHES):
+            points = self._random.uniform(corners[:3], corners[3:], (_POINTS_INSIDE, 3))
+            found.append(points[self._held(points)])
+            if sum(map(len, found)) >= _POINTS_INSIDE:
+                break
+        inside = np.concatenate(found)[:_POINTS_INSIDE]
+        return inside, self.kept.distances(inside)
+
+    def _held(self, points: Floats) -> NDArray[np.bool_]:
+        classifier = BRepClass3d_SolidClassifier(self._solid)
+        return np.array([_state(classifier, point) == TopAbs_IN for point in points], dtype=bool)
+
+
+def points_on(face: TopoDS_Face, count: int) -> Floats:
+    """Points on a face: about as many as asked for of its inside, one at least; shape (n, 3)."""
+    surface, context = BRepAdaptor_Surface(face), IntTools_Context()
+    first_u, last_u, first_v, last_v = BRepTools.UVBounds_s(face)
+    random = np.random.default_rng(0)
+    places = random.uniform((first_u, first_v), (last_u, last_v), (2 * count, 2)).tolist()
+    points = [surface.Value(u, v) for u, v in places if context.IsPointInFace(face, gp_Pnt2d(u, v))][:count]
+    return np.array([(point.X(), point.Y(), point.Z()) for point in [inner_point(face, context), *points]])
+
+
+def _state(classifier: BRepClass3d_SolidClassifier, point: Floats) -> TopAbs_State:
+    classifier.Perform(gp_Pnt(*point.tolist()), _CLASSIFYING_TOLERANCE)
+    return classifier.State()

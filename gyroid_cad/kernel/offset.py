@@ -1,0 +1,182 @@
+"""The kernel's ways to offset a solid, tried in a process of its own.
+
+They crash on some solids, and not every time; on others they do not end. What they give is not to be trusted either:
+that is for :mod:`gyroid_cad.kernel.core` to find out.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+
+from OCP.BinTools import BinTools
+from OCP.BRep import BRep_Builder
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepClass3d import BRepClass3d
+from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
+from OCP.BRepOffsetAPI import BRepOffsetAPI_MakeOffsetShape, BRepOffsetAPI_MakeThickSolid
+from OCP.GeomAbs import GeomAbs_Arc, GeomAbs_Intersection, GeomAbs_JoinType
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopTools import TopTools_ListOfShape
+
+from gyroid_cad.kernel.check import parts_of
+
+__all__ = ["CLOSED_WAYS", "OPEN_WAYS", "offsets", "work"]
+
+Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
+
+_TOLERANCE = 1e-5
+_SECONDS_AT_MOST, _SECONDS_BETWEEN_LOOKS = 60.0, 0.02
+_WORK = "from gyroid_cad.kernel.offset import work; work()"
+_SOLID = "solid.bin"
+
+
+def offsets(
+    solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, ways: Sequence[str]
+) -> Generator[TopoDS_Shape | None]:
+    """What each way of offsetting leaves of a solid inside a skin; None where one fails, crashes or does not end.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+    openings : sequence of TopoDS_Face
+        Faces of the solid that get no skin; ``CLOSED_WAYS`` do not heed them.
+    skin : float
+        In mm.
+    ways : sequence of str
+        Of ``OPEN_WAYS`` and ``CLOSED_WAYS``.
+    """
+    numbers = [k for k, face in enumerate(parts_of(solid, TopAbs_FACE)) if any(face.IsSame(one) for one in openings)]
+    with TemporaryDirectory() as folder:
+        BinTools.Write_s(solid, str(Path(folder, _SOLID)))
+        left = list(ways)
+        while left:
+            process = _start(folder, repr(skin), ",".join(map(str, numbers)), *left)
+            try:
+                while left and (found := _awaited(process, Path(folder, left[0]))):
+                    left.pop(0)
+                    yield _read(found) if found.stat().st_size else None
+            finally:
+                process.kill()
+                process.wait()
+            if left:
+                left.pop(0)
+                yield None
+
+
+def _start(*arguments: str) -> subprocess.Popen[bytes]:
+    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
+    return subprocess.Popen(
+        [sys.executable, "-c", _WORK, *arguments],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def _awaited(process: subprocess.Popen[bytes], path: Path) -> Path | None:
+    """The path once there is a file; None if the process ends before, or takes too long."""
+    end = time.monotonic() + _SECONDS_AT_MOST
+    while not path.exists():
+        if time.monotonic() > end or (process.poll() is not None and not path.exists()):
+            return None
+        time.sleep(_SECONDS_BETWEEN_LOOKS)
+    return path
+
+
+def work() -> None:
+    """Offset the solid in a folder in each of the ways that the command line says, and leave there what they give."""
+    folder, skin, numbers, *ways = sys.argv[1:]
+    for way in ways:
+        given = _read(Path(folder, _SOLID))
+        # Of a placed sphere the kernel seeks the poles where they were before.
+        solid = TopoDS.Solid_s(given.Located(TopLoc_Location()))
+        faces = [TopoDS.Face_s(face) for face in parts_of(solid, TopAbs_FACE)]
+        unfinished = Path(folder, f"{way}, unfinished")
+        unfinished.touch()
+        try:
+            core = _WAYS[way](solid, [faces[int(number)] for number in numbers.split(",") if number], float(skin))
+            BinTools.Write_s(core.Moved(given.Location()), str(unfinished))
+        except Exception:
+            # The kernel has as many kinds of failure as it has algorithms, and some are no exceptions of its own.
+            unfinished.write_bytes(b"")
+        unfinished.rename(Path(folder, way))
+
+
+def _shrunk(
+    solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, join: GeomAbs_JoinType, together: bool
+) -> TopoDS_Shape:
+    """Less a skin everywhere; each void is made larger by itself, as the kernel offsets one shell at a time."""
+    outer = BRepClass3d.OuterShell_s(solid)
+    core = _offset(_solid_of(outer), -skin, join, together)
+    for shell in parts_of(solid, TopAbs_SHELL):
+        if not shell.IsSame(outer):
+            core = BRepAlgoAPI_Cut(core, _offset(_solid_of(shell.Reversed()), skin, GeomAbs_Arc, together)).Shape()
+    return core
+
+
+def _offset(solid: TopoDS_Solid, by: float, join: GeomAbs_JoinType, together: bool) -> TopoDS_Shape:
+    maker = BRepOffsetAPI_MakeOffsetShape()
+    maker.PerformByJoin(solid, by, _TOLERANCE, BRepOffset_Skin, together, False, join, False)
+    return maker.Shape()
+
+
+def _less_thick_skin(
+    solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, join: GeomAbs_JoinType
+) -> TopoDS_Shape:
+    closing = TopTools_ListOfShape()
+    for face in openings:
+        closing.Append(face)
+    maker = BRepOffsetAPI_MakeThickSolid()
+    maker.MakeThickSolidByJoin(solid, closing, -skin, _TOLERANCE, BRepOffset_Skin, True, False, join, False)
+    return BRepAlgoAPI_Cut(solid, maker.Shape()).Shape()
+
+
+def _offset_but_openings(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> TopoDS_Shape:
+    maker = BRepOffset_MakeOffset()
+    maker.Initialize(solid, -skin, _TOLERANCE, BRepOffset_Skin, True, False, GeomAbs_Intersection, False, False)
+    for face in openings:
+        maker.SetOffsetOnFace(face, 0.0)
+    maker.MakeOffsetShape()
+    return maker.Shape()
+
+
+# Arcs keep the skin as thick at edges that point inwards as elsewhere, so they come first.
+OPEN_WAYS: Mapping[str, Way] = MappingProxyType(
+    {
+        "thick skin, arcs": partial(_less_thick_skin, join=GeomAbs_Arc),
+        "thick skin, sharp": partial(_less_thick_skin, join=GeomAbs_Intersection),
+        "all faces but openings": _offset_but_openings,
+    }
+)
+CLOSED_WAYS: Mapping[str, Way] = MappingProxyType(
+    {
+        "arcs": partial(_shrunk, join=GeomAbs_Arc, together=True),
+        "arcs, face by face": partial(_shrunk, join=GeomAbs_Arc, together=False),
+        "sharp": partial(_shrunk, join=GeomAbs_Intersection, together=True),
+    }
+)
+_WAYS: Mapping[str, Way] = MappingProxyType({**OPEN_WAYS, **CLOSED_WAYS})
+
+
+def _read(path: Path) -> TopoDS_Shape:
+    shape = TopoDS_Shape()
+    BinTools.Read_s(shape, str(path))
+    return shape
+
+
+def _solid_of(shell: TopoDS_Shape) -> TopoDS_Solid:
+    builder, solid = BRep_Builder(), TopoDS_Solid()
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell)
+    return solid

@@ -1,0 +1,239 @@
+"""A part as a solid skin round a core, which alone is filled; the skin may be left open at some faces.
+
+Skin and core share the faces between them and the edges round each opening. What of the core's boundary the lattice
+leaves void turns round and bounds the skin; what lies in the lattice is no boundary any more. At an opening it is the
+other way: there the lattice ends, and a void is open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BOPAlgo import BOPAlgo_Builder
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepTools import BRepTools_ReShape
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
+from OCP.TopTools import TopTools_MapOfShape
+
+from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.kernel.check import is_valid, parts_of
+from gyroid_cad.kernel.core import core_of
+from gyroid_cad.kernel.depth import Depths, Faces, points_on
+from gyroid_cad.kernel.part import Part, measure, require_part
+from gyroid_cad.kernel.split import Change, Pieces, compound_of, images, inner_sides, solids_of
+
+__all__ = ["Hollow", "hollow", "openings_of"]
+
+Floats = NDArray[np.float64]
+
+# In mm; kernels call two places one if they are nearer than that, files keep fewer digits.
+_SAME_PLACE = 1e-5
+_POINTS_ON_FACE, _POINTS_ON_EDGE, _POINTS_ON_OPENING = 8, 5, 128
+# The kernel measures faces with wavy borders no closer.
+_SAME_VOLUME = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hollow:
+    """A part, parted into a skin and a core.
+
+    Attributes
+    ----------
+    skin : tuple of TopoDS_Face
+        Faces of the skin that it does not share with the core, oriented outwards: the part's own, and at openings the
+        rims that are left of them.
+    core : Part
+    opened : tuple of bool
+        Which of the core's faces lie in openings, as they are found in its shape; the others are shared with the skin.
+    """
+
+    skin: tuple[TopoDS_Face, ...]
+    core: Part
+    opened: tuple[bool, ...]
+
+    def solids(
+        self, pieces: Pieces, whole: Iterable[TopoDS_Shape], wanted_at: Callable[[Floats], bool]
+    ) -> list[TopoDS_Solid]:
+        """The skin, and with it what faces of a lattice bound in the core.
+
+        Parameters
+        ----------
+        pieces : Pieces
+            Of the core, split against lattice faces oriented out of the solid wanted.
+        whole : iterable of TopoDS_Shape
+            Faces that lie in the core uncut, oriented likewise.
+        wanted_at : callable
+            Whether a point, shape (3,), on the core's boundary belongs to the solid wanted: asked only of pieces of the
+            boundary that hang together with none that the lattice meets.
+
+        Raises
+        ------
+        KernelError
+            If the faces do not close, or do not agree on what is inside.
+        """
+        boundary = zip(pieces.boundary, pieces.origins, inner_sides(pieces, wanted_at), strict=True)
+        ends = [
+            piece if inner else TopoDS.Face_s(piece.Reversed())
+            for piece, origin, inner in boundary
+            if inner == self.opened[origin]
+        ]
+        skin = _with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
+        return solids_of([*skin, *pieces.inside, *map(TopoDS.Face_s, whole), *ends])
+
+
+def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Hollow:
+    """Part a part into a solid skin and the core inside.
+
+    The skin lies on the inner side of all faces but the openings. Regions too thin for a core are skin altogether.
+
+    Parameters
+    ----------
+    part : Part
+    skin : float
+        Its thickness, in mm.
+    openings : sequence of TopoDS_Shape
+        Faces, as of :func:`openings_of`, at which the core comes to the surface, but for a rim as wide as the skin.
+
+    Raises
+    ------
+    ParameterError
+        If the skin leaves no core, or the openings no skin, or an opening is too narrow to be one.
+    KernelError
+        If the kernel cannot offset the part.
+    """
+    opened = openings_of(part, openings)
+    cores: list[TopoDS_Solid] = []
+    deepest = 0.0
+    for solid in part.solids:
+        own = [face for face in opened if _has(solid, face)]
+        depths = Depths(solid, own)
+        _require_skin(depths, own, skin, openings)
+        depth = depths.deepest(skin)
+        if depth > skin:
+            cores += core_of(solid, own, skin, depths)
+        deepest = max(deepest, depth)
+    if not cores:
+        limit = "as deep as the part is below its other faces" if opened else "half the part where it is thickest"
+        raise ParameterError("skin", skin, f"less than about {deepest:.3g} mm, {limit}")
+    core = require_part(compound_of(cores))
+    if opened:
+        return _sharing(part, core, opened)
+    return Hollow(tuple(_faces_of(part.shape)), core, len(_faces_of(core.shape)) * (False,))
+
+
+def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
+    """The part's faces that are, or lie on, given ones: those of the shape that the part was made from, or of a copy.
+
+    Parameters
+    ----------
+    part : Part
+    given : sequence of TopoDS_Shape
+        Faces.
+
+    Raises
+    ------
+    ParameterError
+        If no face of the part lies on one that is given.
+    """
+    faces = _faces_of(part.shape)
+    found: set[int] = set()
+    for face in given:
+        same = {k for k, own in enumerate(faces) if own.IsSame(face)} or _lying_on(face, faces)
+        if not same:
+            raise ParameterError("openings", _shown(given), "faces of the part")
+        found |= same
+    return [faces[k] for k in sorted(found)]
+
+
+def _lying_on(given: TopoDS_Shape, faces: Sequence[TopoDS_Face]) -> set[int]:
+    target = Faces([given])
+    return {k for k, face in enumerate(faces) if all(target.distance(point) < _SAME_PLACE for point in _places(face))}
+
+
+def _places(face: TopoDS_Face) -> Iterator[Floats]:
+    """Points of a face, inside and on its border, the likeliest to tell it from another first."""
+    yield from points_on(face, _POINTS_ON_FACE)
+    for edge in parts_of(face, TopAbs_EDGE):
+        if BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
+            continue
+        curve = BRepAdaptor_Curve(TopoDS.Edge_s(edge))
+        for place in np.linspace(curve.FirstParameter(), curve.LastParameter(), _POINTS_ON_EDGE).tolist():
+            point = curve.Value(place)
+            yield np.array([point.X(), point.Y(), point.Z()])
+
+
+def _require_skin(depths: Depths, openings: Sequence[TopoDS_Face], skin: float, given: Sequence[TopoDS_Shape]) -> None:
+    """Raise if the openings are all faces of a solid, or one of them is so narrow that its rim fills it."""
+    if not depths.kept:
+        raise ParameterError("openings", _shown(given), "some faces of each solid to be left for the skin")
+    for face in openings:
+        if not np.any(depths.kept.distances(points_on(face, _POINTS_ON_OPENING)) > skin):
+            raise ParameterError("openings", _shown(given), f"faces wider than their rims, which are {skin:g} mm wide")
+
+
+def _shown(given: Sequence[TopoDS_Shape]) -> str:
+    return f"{len(given)} face{'s' if len(given) != 1 else ''}"
+
+
+def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face]) -> Hollow:
+    """Skin and core of a part with openings, once the part's faces there are split where the core comes to them."""
+    fuse = BOPAlgo_Builder()
+    fuse.SetNonDestructive(True)
+    fuse.AddArgument(part.shape)
+    fuse.AddArgument(core.shape)
+    fuse.Perform()
+    if fuse.HasErrors():
+        raise KernelError("the kernel could not part the skin from its core at the openings")
+    solids = [TopoDS.Solid_s(image) for solid in core.solids for image in images(fuse, solid)]
+    core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
+    inner, ends = TopTools_MapOfShape(), TopTools_MapOfShape()
+    for face in _faces_of(core.shape):
+        inner.Add(face)
+    for opening in openings:
+        found = [image for image in images(fuse, opening) if inner.Contains(image)]
+        if not found:
+            raise KernelError("the kernel's core does not come to an opening")
+        for image in found:
+            ends.Add(image)
+    pieces = (TopoDS.Face_s(piece) for face in _faces_of(part.shape) for piece in images(fuse, face))
+    skin = tuple(piece for piece in pieces if not inner.Contains(piece))
+    made = Hollow(skin, core, tuple(bool(ends.Contains(face)) for face in _faces_of(core.shape)))
+    _require_all_of(part, made)
+    return made
+
+
+def _require_all_of(part: Part, made: Hollow) -> None:
+    """Raise if skin and core are not, together, the part."""
+    empty = Pieces((), tuple(_faces_of(made.core.shape)), tuple(range(len(made.opened))))
+    skin = sum(measure(solid)[0] for solid in made.solids(empty, (), lambda point: False))
+    core = measure(made.core.shape)[0]
+    if not abs(skin + core - part.volume) < _SAME_VOLUME * part.volume or not is_valid(made.core.shape):
+        raise KernelError("the kernel parted the part wrongly into skin and core")
+
+
+def _with_changes(faces: Iterable[TopoDS_Face], changed: Iterable[Change]) -> list[TopoDS_Face]:
+    """The faces with the edges and vertices that have been split or made anew in place of the old ones."""
+    builder, reshape = BRep_Builder(), BRepTools_ReShape()
+    for old, new in changed:
+        if old.ShapeType() == TopAbs_EDGE:
+            wire = TopoDS_Wire()
+            builder.MakeWire(wire)
+            for edge in new:
+                builder.Add(wire, edge)
+            reshape.Replace(old, wire)
+        else:
+            reshape.Replace(old, new[0])
+    return [TopoDS.Face_s(reshape.Apply(face)) for face in faces]
+
+
+def _faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
+    return [TopoDS.Face_s(face) for face in parts_of(shape, TopAbs_FACE)]
+
+
+def _has(solid: TopoDS_Solid, face: TopoDS_Face) -> bool:
+    return any(own.IsSame(face) for own in parts_of(solid, TopAbs_FACE))

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from build123d import Align, BasePartObject, BuildPart, Compound, Location, Mode, Part, RotationLike
-from build123d.build_common import BaseObject
 from build123d.geometry import to_align_offset
 
 from gyroid_cad.errors import ParameterError
@@ -72,7 +71,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         super().__init__(part=part, rotation=rotation, align=None, mode=mode)
 
 
-class GyroidFill(Part, BaseObject):  # type: ignore[misc]
+class GyroidFill(Part):  # type: ignore[misc]
     """Part Operation: GyroidFill
 
     What is left of a part that is filled with gyroid.
@@ -98,8 +97,6 @@ class GyroidFill(Part, BaseObject):  # type: ignore[misc]
     ParameterError, SoundnessError, FitError, KernelError
     """
 
-    _applies_to = [BuildPart._tag]  # noqa: RUF012 (the host's own declaration)
-
     def __init__(
         self,
         part: Any = None,
@@ -113,7 +110,8 @@ class GyroidFill(Part, BaseObject):  # type: ignore[misc]
         mode: Mode = Mode.REPLACE,
         **settings: Any,
     ) -> None:
-        context: BuildPart | None = BuildPart._get_context(self)
+        # As the host's operations do, not as its objects: those are placed at the builder's locations.
+        context: BuildPart | None = BuildPart._get_context("GyroidFill")
         subject = part if part is not None or context is None else context.part
         if subject is None:
             raise ParameterError("part", part, "a part, or a builder with one in it")
@@ -123,5 +121,4 @@ class GyroidFill(Part, BaseObject):  # type: ignore[misc]
         shape = Part.cast(filled.solid())
         super().__init__(obj=(shape if isinstance(shape, Compound) else Compound([shape])).wrapped)
         if context is not None:
-            # Not by way of the builder's locations: the part is where it is.
             context._add_to_context(self, clean=False, mode=mode)

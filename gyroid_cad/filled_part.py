@@ -15,7 +15,7 @@ from gyroid_cad.covering import CROSSING, INSIDE, PHASES, Frame
 from gyroid_cad.errors import KernelError
 from gyroid_cad.infill import Infill
 from gyroid_cad.regions import Region
-from gyroid_cad.stages import Progress, timed
+from gyroid_cad.stages import Progress, tell, timed
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.part import Part
@@ -111,10 +111,11 @@ class Filling:
         with self.timed("cover"):
             points = points[self.core.holds(points)]
         problem: KernelError | None = None
-        for phase in PHASES:
+        # The last time in one process: should it be the joining of regions that fails.
+        for phase, processes in zip(PHASES, (None, None, 1), strict=True):
             shift = np.array(phase) * self.cell_size
             try:
-                return self._filled(replace(frame, origin=frame.origin + shift), shift, points)
+                return self._filled(replace(frame, origin=frame.origin + shift), shift, points, processes)
             except KernelError as failed:
                 problem = problem or failed
         raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
@@ -122,10 +123,10 @@ class Filling:
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
 
-    def _filled(self, frame: Frame, shift: Floats, points: Floats) -> Outcome:
+    def _filled(self, frame: Frame, shift: Floats, points: Floats, processes: int | None) -> Outcome:
         infill = self.infill_in(frame, self.timed)
         box = self.core.box if infill.endless and self.hollow is None else None
-        made, cut, whole = self._by_booleans(infill) if box is None else self._by_sections(infill, box)
+        made, cut, whole = self._by_booleans(infill, processes) if box is None else self._by_sections(infill, box)
         with self.timed("check"):
             for region in self.regions:
                 self._require_right_size(infill, region, made[region.name], points)
@@ -155,9 +156,10 @@ class Filling:
             cut, whole = max(cut, counted[0]), max(whole, counted[1])
         return made, cut, whole
 
-    def _by_booleans(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
+    def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
         from gyroid_cad.kernel.part import measure
-        from gyroid_cad.kernel.split import bounded_solids, shells_of, split
+        from gyroid_cad.kernel.regional import split_by_region
+        from gyroid_cad.kernel.split import bounded_solids, shells_of
 
         with self.timed("cover"):
             sides = infill.sides(self._distance_from_boundary(), self.core.holds)
@@ -170,7 +172,9 @@ class Filling:
                 for side in (CROSSING, INSIDE)
             )
             with self.timed("split"):
-                pieces = split(self.core, cut)
+                pieces = split_by_region(
+                    self.core, cut, processes, lambda done, count: tell(self.progress, "split", done, count)
+                )
 
             def wanted_at(point: Floats, region: Region = region) -> bool:
                 return bool(infill.holds(region, point[np.newaxis])[0])

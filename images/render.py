@@ -165,7 +165,7 @@ def render(picture: Picture, target: Path) -> Path:
             actor.SetPosition(*(beside * picture.axes[0]).tolist())
             renderer.AddActor(actor)
     _place_camera(renderer, picture, seen)
-    _write(renderer, picture.size, target)
+    write_picture(renderer, picture.size, target)
     return target
 
 
@@ -271,7 +271,8 @@ def _place_camera(renderer: vtk.vtkRenderer, picture: Picture, seen: Floats) -> 
     renderer.ResetCameraClippingRange()
 
 
-def _write(renderer: vtk.vtkRenderer, size: tuple[int, int], target: Path) -> None:
+def write_picture(renderer: vtk.vtkRenderer, size: tuple[int, int], target: Path) -> None:
+    """Draw off-screen and write as PNG, in few colours."""
     window = vtk.vtkRenderWindow()
     window.SetOffScreenRendering(True)
     window.SetMultiSamples(8)

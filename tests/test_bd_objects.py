@@ -9,7 +9,7 @@ import build123d as bd
 import numpy as np
 import pytest
 
-from gyroid_cad.bd_objects import Gyroid
+from gyroid_cad.bd_objects import Gyroid, GyroidFill
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.field_makers import linear
 from gyroid_cad.fit import FitSettings
@@ -188,3 +188,48 @@ def test_fields_and_maps_are_those_of_a_lattice() -> None:
     assert len(part.solids()) == 1
     assert part.volume == pytest.approx(lattice.exact_volume, rel=2e-3)
     np.testing.assert_allclose(box_of(part), lattice.bounding_box(), atol=1e-6)
+
+
+FILL: dict[str, Any] = {"cell_size": 10, "thickness": 0.9, "fit": FitSettings(4)}
+
+
+def test_a_builders_part_is_replaced_by_what_is_left_of_it_wherever_its_locations_are() -> None:
+    with bd.BuildPart() as builder:
+        bd.Box(4, 5, 3)
+        with bd.Locations((100, 0, 0), (0, 50, 0)):
+            light = GyroidFill(**FILL)
+    assert builder.part is not None
+    assert builder.part.volume == pytest.approx(light.report.volume, rel=1e-5)
+    assert builder.part.is_valid
+
+
+def test_in_algebra_a_part_is_filled_and_left_as_it_was() -> None:
+    box = bd.Box(4, 5, 3)
+    light = GyroidFill(box, **FILL)
+    assert isinstance(light, bd.Part)
+    assert light.volume == pytest.approx(light.report.volume, rel=1e-5)
+    assert box.volume == pytest.approx(4 * 5 * 3)
+
+
+def test_faces_of_the_part_may_be_left_open() -> None:
+    box = bd.Box(5, 5, 4)
+    light = GyroidFill(box, **FILL, skin=0.5, openings=box.faces().sort_by(bd.Axis.Z)[-1:])
+    above = light.faces().filter_by_position(bd.Axis.Z, 2 - 1e-6, 2 + 1e-6)
+    assert light.is_valid
+    assert sum(face.area for face in above) < 5 * 5 - 1
+
+
+def test_filling_may_add_to_what_is_there_or_cut_from_it() -> None:
+    with bd.BuildPart() as builder:
+        bd.Box(4, 5, 3)
+        channels = GyroidFill(**FILL, kind="channels", mode=bd.Mode.PRIVATE)
+    assert builder.part is not None
+    assert builder.part.volume == pytest.approx(4 * 5 * 3)
+    assert 0 < channels.volume < 4 * 5 * 3
+
+
+def test_nothing_to_fill_is_refused() -> None:
+    with pytest.raises(ParameterError, match="a builder with one in it"), bd.BuildPart():
+        GyroidFill(**FILL)
+    with pytest.raises(ParameterError, match="part = None"):
+        GyroidFill(**FILL)

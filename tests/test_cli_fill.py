@@ -55,6 +55,67 @@ def test_the_table_shows_what_it_weighs_before_and_after(capsys: Captured, peg: 
     assert " g of " in done.out
 
 
+@pytest.fixture
+def block(tmp_path: Path) -> Path:
+    write_step(cq.Workplane().box(6, 5, 7).val().wrapped, tmp_path / "block.step")
+    return tmp_path / "block.step"
+
+
+def test_with_a_skin_left_open_at_one_side_it_is_one_closed_solid(capsys: Captured, block: Path) -> None:
+    options = ["--thickness", "1", "--skin", "0.8", "--opening", ">Z", "--opening", "0,0,-3.5", "--json"]
+    done = run(capsys, block, "-o", block.with_name("skin.step"), *FILL, *options)
+    assert done.status == 0, done.err
+    summary, shape = json.loads(done.out), read_step(block.with_name("skin.step"))
+    assert is_valid(shape)
+    assert topology(shape).closed
+    assert summary["solids"] - summary["islands"] == 1
+    assert summary["smallest_wall"] == summary["skin"] == 0.8
+    # The skin alone: the block less what is left of it within four walls, open above and below.
+    assert summary["volume"] > 6 * 5 * 7 - 4.4 * 3.4 * 7
+
+
+def test_a_wall_may_vary_and_the_table_says_where_it_is_thinnest(capsys: Captured, block: Path) -> None:
+    done = run(capsys, block, "-o", block.with_name("a.step"), *FILL, "--thickness", "1 + 0.04*z")
+    assert done.status == 0, done.err
+    assert "smallest wall" in done.out
+
+
+def test_the_bare_surface_is_written_as_shells(capsys: Captured, block: Path) -> None:
+    done = run(capsys, block, "-o", block.with_name("a.step"), *FILL, "--kind", "surface", "--json")
+    assert done.status == 0, done.err
+    shape = read_step(block.with_name("a.step"))
+    assert topology(shape).solids == 0
+    assert topology(shape).faces == json.loads(done.out)["faces"]
+
+
+@pytest.mark.parametrize("unit", ["INCH", "MM"])
+def test_lengths_in_a_file_are_what_its_unit_says(capsys: Captured, tmp_path: Path, unit: str) -> None:
+    path = tmp_path / "part.step"
+    cq.exporters.export(cq.Workplane().box(4, 4, 4), str(path), unit=unit)
+    done = run(capsys, path, "-o", tmp_path / "a.brep", *FILL, "--thickness", "1", "--json")
+    side = 4 * (25.4 if unit == "INCH" and "INCH" in path.read_text() else 1)
+    assert json.loads(done.out)["part_volume"] == pytest.approx(side**3)
+
+
+def test_every_solid_of_a_file_is_filled(capsys: Captured, tmp_path: Path) -> None:
+    two = cq.Workplane().pushPoints([(0, 0), (9, 0)]).box(4, 4, 4)
+    write_step(cq.Compound.makeCompound(two.vals()).wrapped, tmp_path / "two.step")
+    done = run(capsys, tmp_path / "two.step", "-o", tmp_path / "a.brep", *FILL, "--thickness", "1", "--json")
+    summary = json.loads(done.out)
+    assert summary["part_volume"] == pytest.approx(2 * 4**3)
+    assert summary["solids"] >= 2
+
+
+@pytest.mark.parametrize("part", [0.3, 0.7, 0.95])
+def test_a_file_cut_short_is_refused(capsys: Captured, peg: Path, part: float) -> None:
+    content = peg.read_bytes()
+    peg.write_bytes(content[: int(part * len(content))])
+    failed = run(capsys, peg, "-o", peg.with_name("a.step"), *FILL, "--density", "0.3")
+    assert failed.status in (1, 2)
+    assert len(failed.err.splitlines()) == 1
+    assert not peg.with_name("a.step").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -64,6 +125,11 @@ def test_the_table_shows_what_it_weighs_before_and_after(capsys: Captured, peg: 
         (["--density", "0.3", "--kind", "truss"], "--kind"),
         (["--density", "0.3", "--angle", "90"], "--angle"),
         (["--thickness", "6", "--cell-size", "20"], "the part's smallest extent, 5 mm"),
+        (["--density", "0.3 + q"], "--density"),
+        (["--density", "0.3", "--skin", "-1"], "--skin = -1.0"),
+        (["--density", "0.3", "--skin", "5"], "--skin = 5.0"),
+        (["--density", "0.3", "--opening", ">Z"], "none without a skin"),
+        (["--density", "0.3", "--skin", "0.8", "--opening", "1,2"], "--openings = [1.0, 2.0]"),
     ],
 )
 def test_bad_usage_is_one_line_and_leaves_no_file(capsys: Captured, peg: Path, options: list[str], words: str) -> None:

@@ -15,6 +15,7 @@ import gyroid_cad.cq_plugin
 from gyroid_cad.block_maps import Twist
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.field_makers import linear
+from gyroid_cad.filling import fill
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
 
@@ -185,8 +186,8 @@ def installation() -> dict[str, Any]:
     return dict(json.loads(run.stdout))
 
 
-def test_importing_the_plugin_changes_one_attribute_of_one_class(installation: dict[str, Any]) -> None:
-    assert installation["changed"] == [["Workplane", "gyroid"]]
+def test_importing_the_plugin_adds_two_methods_to_one_class(installation: dict[str, Any]) -> None:
+    assert sorted(installation["changed"]) == [["Workplane", "gyroid"], ["Workplane", "gyroid_fill"]]
     assert cq.Workplane.gyroid is gyroid_cad.cq_plugin.gyroid
 
 
@@ -208,3 +209,33 @@ def test_fields_and_maps_are_those_of_a_lattice() -> None:
     assert shape.ShapeType() == "Solid"
     assert shape.Volume() == pytest.approx(lattice.exact_volume, rel=2e-3)
     np.testing.assert_allclose(np.ptp(box_of(shape), axis=0), np.ptp(lattice.bounding_box(), axis=0), atol=1e-6)
+
+
+def test_a_part_in_the_chain_is_filled_and_replaced_by_what_is_left() -> None:
+    part = cq.Workplane().box(4, 5, 3).faces(">Z").workplane()
+    light = part.gyroid_fill(10, 0.9, fit=FitSettings(4))
+    expected = fill(cq.Workplane().box(4, 5, 3), 10, 0.9, fit=FitSettings(4))
+    assert light.size() == 1
+    assert light.val().isValid()
+    assert total_volume(light) == pytest.approx(expected.report.volume, rel=1e-5)
+    assert part.findSolid().Volume() == pytest.approx(4 * 5 * 3)
+
+
+def test_selected_faces_are_where_the_skin_is_left_open() -> None:
+    box = cq.Workplane().box(5, 5, 4)
+    open_above = box.faces(">Z").gyroid_fill(10, 0.9, skin=0.5, fit=FitSettings(4))
+    area_above = sum(face.Area() for face in open_above.faces(">Z").vals())
+    assert open_above.val().isValid()
+    assert area_above < 5 * 5 - 1
+    assert box.gyroid_fill(10, 0.9, skin=0.5, fit=FitSettings(4)).faces(">Z").val().Area() == pytest.approx(25)
+
+
+def test_a_chain_without_a_solid_is_refused() -> None:
+    with pytest.raises(ParameterError, match="a chain with a solid in it"):
+        cq.Workplane().gyroid_fill(10, 0.9)
+
+
+def test_a_lattice_cut_to_its_box_has_the_size_of_its_cells() -> None:
+    block = cq.Workplane().gyroid((2, 1, 1), 10.0, density=0.3, fit=FitSettings(6), trim="box")
+    corners = np.array([vertex.toTuple() for vertex in block.vertices().vals()])
+    np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], [[-10, -5, -5], [10, 5, 5]], atol=1e-9)

@@ -14,6 +14,7 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial.transform import Rotation
 
+import gyroid_cad.kernel.regional
 import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.filled_part import Filling
@@ -266,7 +267,7 @@ def test_a_file_that_is_no_part_is_an_error(tmp_path: Path, content: bytes) -> N
 def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    split, calls = gyroid_cad.kernel.split.split, []
+    split, calls = gyroid_cad.kernel.regional.split_by_region, []
 
     def failing_once(*arguments: Any) -> Any:
         calls.append(arguments)
@@ -274,7 +275,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
             raise KernelError("tangent")
         return split(*arguments)
 
-    monkeypatch.setattr(gyroid_cad.kernel.split, "split", failing_once)
+    monkeypatch.setattr(gyroid_cad.kernel.regional, "split_by_region", failing_once)
     report = fill(ball(), CELL, WALL, fit=COARSE).report
     assert len(calls) == 2
     assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
@@ -284,7 +285,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
 @pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
 def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
     solids = [ball().val().wrapped] if wrong == "the part itself" else []
-    monkeypatch.setattr(gyroid_cad.kernel.split, "split", lambda *arguments: None)
+    monkeypatch.setattr(gyroid_cad.kernel.regional, "split_by_region", lambda *arguments: None)
     monkeypatch.setattr(gyroid_cad.kernel.split, "bounded_solids", lambda *arguments: solids)
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(ball(), CELL, WALL, fit=COARSE)

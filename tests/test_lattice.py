@@ -21,7 +21,7 @@ from OCP.TopLoc import TopLoc_Location
 from gyroid_cad import Lattice
 from gyroid_cad.errors import FitError, GyroidError, ParameterError
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.kernel.check import enclosed_volume, topology
+from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, THICKNESS_LIMIT
 
@@ -267,3 +267,44 @@ def test_a_name_with_a_null_character_and_no_name_at_all_are_refused() -> None:
         Lattice(**GOOD).write("a\0.step")
     with pytest.raises(ParameterError, match="at least one file name"):
         Lattice(**GOOD).write()
+
+
+def test_a_lattice_cut_to_its_block_has_exactly_the_block_s_share() -> None:
+    made = Lattice((2, 1, 1), 10, density=0.3, trim="box").report()
+    assert made.valid
+    assert made.closed
+    assert made.volume == pytest.approx(0.3 * 2000, rel=1e-6)
+    assert made.free_edges == made.pinch_lines == 0
+
+
+def test_a_cut_lattice_fills_its_block_exactly() -> None:
+    low, high = Lattice((2, 1, 1), 10, 0.8, trim="box", fit=FitSettings(6)).bounding_box()
+    assert (low, high) == ((0, 0, 0), (20, 10, 10))
+
+
+def test_a_wall_that_touches_the_block_s_sides_is_shifted_a_little() -> None:
+    # At a quarter of the cell the faces are tangent to the planes between cells, at the centres of patches.
+    lattice = Lattice((1, 1, 1), 10, 2.5, trim="box")
+    assert 0 < max(lattice.built().shift) < 0.1
+    assert lattice.report().valid
+
+
+def test_a_cut_lattice_is_written_and_read_back(tmp_path: Path) -> None:
+    lattice = Lattice((1, 1, 1), 10, "0.6 + 0.02*x", trim="box", fit=FitSettings(6), tolerance=1e-3)
+    lattice.write(tmp_path / "a.step")
+    shape = read_step(tmp_path / "a.step")
+    assert is_valid(shape)
+    assert topology(shape).closed
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"trim": "ball"}, "trim = 'ball': expected box"),
+        ({"trim": "box", "map": "twist:angle=10"}, "none where a map"),
+        ({"trim": "box", "scale_field": "1 + 0.01*x"}, "none where a map or a scale field"),
+    ],
+)
+def test_what_cannot_be_cut_is_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        Lattice((1, 1, 1), 10, 0.8, **given)

@@ -28,7 +28,7 @@ __all__ = ["Depths", "Faces", "points_on"]
 Floats = NDArray[np.float64]
 
 _CLASSIFYING_TOLERANCE = 1e-7
-_POINTS_INSIDE, _POINTS_ON_FACE, _BATCHES = 200, 12, 32
+_POINTS_INSIDE, _POINTS_ON_FACE, _BATCHES = 200, 16, 32
 # Of the thickness of a skin: how thin it may be anywhere, and how thick where its inner faces meet at sharp edges.
 _THINNEST, _THICKEST = 0.99, 2.02
 # Of the thickness of a skin: points so near an opening lie on it.

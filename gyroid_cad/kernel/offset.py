@@ -17,13 +17,14 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
 from OCP.BinTools import BinTools
-from OCP.BRep import BRep_Builder
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepClass3d import BRepClass3d
 from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
 from OCP.BRepOffsetAPI import BRepOffsetAPI_MakeOffsetShape, BRepOffsetAPI_MakeThickSolid
 from OCP.GeomAbs import GeomAbs_Arc, GeomAbs_Intersection, GeomAbs_JoinType
-from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
+from OCP.ShapeCustom import ShapeCustom
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 from OCP.TopTools import TopTools_ListOfShape
@@ -99,14 +100,16 @@ def work() -> None:
     folder, skin, numbers, *ways = sys.argv[1:]
     for way in ways:
         given = _read(Path(folder, _SOLID))
-        # Of a placed sphere the kernel seeks the poles where they were before.
-        solid = TopoDS.Solid_s(given.Located(TopLoc_Location()))
+        place = _place(given)
+        solid = TopoDS.Solid_s(given.Moved(place.Inverted()))
         faces = [TopoDS.Face_s(face) for face in parts_of(solid, TopAbs_FACE)]
         unfinished = Path(folder, f"{way}, unfinished")
         unfinished.touch()
         try:
             core = _WAYS[way](solid, [faces[int(number)] for number in numbers.split(",") if number], float(skin))
-            BinTools.Write_s(core.Moved(given.Location()), str(unfinished))
+            # Surfaces that are the offset of another do not survive STEP files.
+            plain = ShapeCustom.ConvertToBSpline_s(core, False, False, True, False)
+            BinTools.Write_s(plain.Moved(place), str(unfinished))
         except Exception:
             # The kernel has as many kinds of failure as it has algorithms, and some are no exceptions of its own.
             unfinished.write_bytes(b"")
@@ -126,9 +129,20 @@ def _shrunk(
 
 
 def _offset(solid: TopoDS_Solid, by: float, join: GeomAbs_JoinType, together: bool) -> TopoDS_Shape:
+    place = _place(solid)
     maker = BRepOffsetAPI_MakeOffsetShape()
-    maker.PerformByJoin(solid, by, _TOLERANCE, BRepOffset_Skin, together, False, join, False)
-    return maker.Shape()
+    maker.PerformByJoin(solid.Moved(place.Inverted()), by, _TOLERANCE, BRepOffset_Skin, together, False, join, False)
+    return maker.Shape().Moved(place)
+
+
+def _place(shape: TopoDS_Shape) -> TopLoc_Location:
+    """Where a sphere in it has been moved to, or it itself: the kernel seeks a moved sphere's poles where they were."""
+    for face in parts_of(shape, TopAbs_FACE):
+        if any(BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)) for edge in parts_of(face, TopAbs_EDGE)):
+            place = TopLoc_Location()
+            BRep_Tool.Surface_s(TopoDS.Face_s(face), place)
+            return place
+    return shape.Location()
 
 
 def _less_thick_skin(

@@ -107,19 +107,20 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
         If the kernel cannot offset the part.
     """
     opened = openings_of(part, openings)
-    cores: list[TopoDS_Solid] = []
-    deepest = 0.0
-    for solid in part.solids:
-        own = [face for face in opened if _has(solid, face)]
-        depths = Depths(solid, own)
-        _require_skin(depths, own, skin, openings)
-        depth = depths.deepest(skin)
-        if depth > skin:
-            cores += core_of(solid, own, skin, depths)
-        deepest = max(deepest, depth)
-    if not cores:
+    own = [[face for face in opened if _has(solid, face)] for solid in part.solids]
+    depths = [Depths(solid, faces) for solid, faces in zip(part.solids, own, strict=True)]
+    _require_skin(depths, openings)
+    deepest = [depth.deepest(skin) for depth in depths]
+    if max(deepest) <= skin:
         limit = "as deep as the part is below its other faces" if opened else "half the part where it is thickest"
-        raise ParameterError("skin", skin, f"less than about {deepest:.3g} mm, {limit}")
+        raise ParameterError("skin", skin, f"less than about {max(deepest):.3g} mm, {limit}")
+    _require_wide(own, depths, skin, openings)
+    cores = [
+        core
+        for solid, faces, depth, deep in zip(part.solids, own, depths, deepest, strict=True)
+        if deep > skin
+        for core in core_of(solid, faces, skin, depth)
+    ]
     core = require_part(compound_of(cores))
     if opened:
         return _sharing(part, core, opened)
@@ -167,13 +168,19 @@ def _places(face: TopoDS_Face) -> Iterator[Floats]:
             yield np.array([point.X(), point.Y(), point.Z()])
 
 
-def _require_skin(depths: Depths, openings: Sequence[TopoDS_Face], skin: float, given: Sequence[TopoDS_Shape]) -> None:
-    """Raise if the openings are all faces of a solid, or one of them is so narrow that its rim fills it."""
-    if not depths.kept:
+def _require_skin(depths: Iterable[Depths], given: Sequence[TopoDS_Shape]) -> None:
+    if not all(depth.kept for depth in depths):
         raise ParameterError("openings", _shown(given), "some faces of each solid to be left for the skin")
-    for face in openings:
-        if not np.any(depths.kept.distances(points_on(face, _POINTS_ON_OPENING)) > skin):
-            raise ParameterError("openings", _shown(given), f"faces wider than their rims, which are {skin:g} mm wide")
+
+
+def _require_wide(
+    openings: Sequence[Sequence[TopoDS_Face]], depths: Sequence[Depths], skin: float, given: Sequence[TopoDS_Shape]
+) -> None:
+    """Raise if an opening is so narrow that its rim fills it."""
+    for faces, depth in zip(openings, depths, strict=True):
+        for face in faces:
+            if not np.any(depth.kept.distances(points_on(face, _POINTS_ON_OPENING)) > skin):
+                raise ParameterError("openings", _shown(given), f"faces wider than rims of {skin:g} mm all round")
 
 
 def _shown(given: Sequence[TopoDS_Shape]) -> str:

@@ -31,7 +31,7 @@ from OCP.TopAbs import (
     TopAbs_VERTEX,
 )
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
@@ -40,10 +40,14 @@ from gyroid_cad.kernel.part import Part
 __all__ = [
     "Pieces",
     "bounded_solids",
+    "changes",
     "compound_of",
+    "general_fuse",
     "images",
     "inner_point",
     "inner_sides",
+    "lies_in",
+    "running_like",
     "shells_of",
     "solids_of",
     "split",
@@ -96,28 +100,21 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     boundary = [TopoDS.Face_s(face) for face in parts_of(part.shape, TopAbs_FACE)]
     if not faces:
         return Pieces((), tuple(boundary), tuple(range(len(boundary))))
-    fuse = BOPAlgo_Builder()
-    fuse.SetNonDestructive(True)
-    fuse.AddArgument(part.shape)
-    # As one argument: the kernel then takes it for granted that the faces cross nowhere themselves.
-    fuse.AddArgument(compound_of(faces))
-    fuse.Perform()
-    if fuse.HasErrors():
-        raise KernelError(f"the kernel could not split the part against {len(faces)} faces of the lattice")
+    fuse = general_fuse(part.shape, compound_of(faces))
     context = IntTools_Context()
     classifiers = [BRepClass3d_SolidClassifier(solid) for solid in part.solids]
     inside = [
         piece
         for face in faces
         for piece in images(fuse, face)
-        if any(_lies_in(piece, classifier, context) for classifier in classifiers)
+        if any(lies_in(piece, classifier, context) for classifier in classifiers)
     ]
     pieces = [(piece, index) for index, face in enumerate(boundary) for piece in images(fuse, face)]
     return Pieces(
         tuple(TopoDS.Face_s(piece) for piece in inside),
         tuple(TopoDS.Face_s(piece) for piece, _ in pieces),
         tuple(index for _, index in pieces),
-        _changed(fuse, part.shape),
+        changes(fuse, part.shape),
     )
 
 
@@ -320,7 +317,7 @@ def _solids(shells: Sequence[TopoDS_Shell]) -> list[TopoDS_Solid]:
             outer.append((solid, classifier))
     # Solids before voids are added: of those round a void, which lie in each other's voids, the smallest is its own.
     round_void = [
-        [solid for solid, classifier in outer if _lies_in(next(parts_of(shell, TopAbs_FACE)), classifier, context)]
+        [solid for solid, classifier in outer if lies_in(next(parts_of(shell, TopAbs_FACE)), classifier, context)]
         for shell in voids
     ]
     for shell, solids in zip(voids, round_void, strict=True):
@@ -336,14 +333,33 @@ def _extent(shape: TopoDS_Shape) -> float:
     return float(box.SquareExtent())
 
 
+def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
+    """The kernel's general fuse; within an argument it looks for no crossings."""
+    fuse = BOPAlgo_Builder()
+    fuse.SetNonDestructive(True)
+    for argument in arguments:
+        fuse.AddArgument(argument)
+    fuse.Perform()
+    if fuse.HasErrors():
+        raise KernelError("the kernel could not split the part against the faces of the lattice")
+    return fuse
+
+
 def images(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    """What a shape has become in the kernel's general fuse: itself, if nothing crossed it."""
+    """What a shape has become in a general fuse: itself, if nothing crossed it."""
     if fuse.IsDeleted(shape):
         return []
-    return list(fuse.Modified(shape)) or [shape]
+    # Taken off one by one: to iterate over a list of the kernel's ends in an exception, a hundred times as slow.
+    left = TopTools_ListOfShape(fuse.Modified(shape))
+    found = []
+    while not left.IsEmpty():
+        found.append(left.First())
+        left.RemoveFirst()
+    return found or [shape]
 
 
-def _changed(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> tuple[Change, ...]:
+def changes(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> tuple[Change, ...]:
+    """Edges and vertices of a shape that a general fuse split or made anew, as of :class:`Pieces`."""
     context = IntTools_Context()
     parts = TopTools_IndexedMapOfShape()
     for kind in (TopAbs_EDGE, TopAbs_VERTEX):
@@ -352,14 +368,14 @@ def _changed(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> tuple[Change, ...]:
     changed = []
     for number in range(1, parts.Extent() + 1):
         pieces = tuple(
-            _running_like(parts.FindKey(number), piece, context) for piece in fuse.Modified(parts.FindKey(number))
+            running_like(parts.FindKey(number), piece, context) for piece in fuse.Modified(parts.FindKey(number))
         )
         if pieces:
             changed.append((parts.FindKey(number), pieces))
     return tuple(changed)
 
 
-def _running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Context) -> TopoDS_Shape:
+def running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Context) -> TopoDS_Shape:
     """The piece of an edge the way the edge runs; the kernel hands it out the way it was met first."""
     forward = piece.Oriented(TopAbs_FORWARD)
     if whole.ShapeType() != TopAbs_EDGE:
@@ -368,7 +384,8 @@ def _running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Co
     return forward.Reversed() if backwards else forward
 
 
-def _lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
+def lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
+    """Whether a face that crosses a solid's boundary nowhere lies in it."""
     classifier.Perform(inner_point(TopoDS.Face_s(face), context), _CLASSIFYING_TOLERANCE)
     return bool(classifier.State() == TopAbs_IN)
 

@@ -1,0 +1,258 @@
+"""Parts with a solid skin: the core it leaves, openings, lattices in it, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import cadquery as cq
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
+from scipy.spatial import cKDTree
+
+import gyroid_cad.kernel.core
+import gyroid_cad.kernel.offset
+from gyroid_cad.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
+from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.fit import FitSettings, fit_patch
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.depth import Depths
+from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
+from gyroid_cad.kernel.part import Part, measure, require_part
+from gyroid_cad.kernel.skin import Hollow, hollow, openings_of
+from gyroid_cad.kernel.solid import realise_faces
+from gyroid_cad.kernel.split import bounded_solids, compound_of, split
+from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.wall import build_wall
+
+Floats = NDArray[np.float64]
+
+CELL, WALL, SKIN = 10.0, 0.8, 1.0
+FRAME = Frame(np.array([1.0, 2.0, 3.0]), np.eye(3))
+RADIUS = 4.0
+SIDES = (9.0, 8.0, 7.0)
+
+
+def wrapped(made: Any) -> TopoDS_Shape:
+    return compound_of(shape.wrapped for shape in made.vals())
+
+
+def ball(radius: float = RADIUS) -> cq.Workplane:
+    return cq.Workplane(origin=(5, 5, 5)).sphere(radius)
+
+
+def box() -> cq.Workplane:
+    return cq.Workplane(origin=(5, 5, 5)).box(*SIDES)
+
+
+def plate() -> cq.Workplane:
+    """20 by 16 by 6, its corners rounded with 3, a hole of 5 across through it."""
+    return cq.Workplane().box(20, 16, 6).edges("|Z").fillet(3).faces(">Z").workplane().hole(5)
+
+
+def dumb_bell() -> cq.Workplane:
+    """Its bar is too thin to have a core."""
+    return cq.Workplane().pushPoints([(-8, 0), (8, 0)]).box(6, 6, 6).union(cq.Workplane().box(16, 1, 1))
+
+
+def flanged() -> cq.Workplane:
+    return cq.Workplane().box(6, 6, 6).union(cq.Workplane().box(9, 6, 1.9))
+
+
+def parted(made: cq.Workplane, skin: float = SKIN, openings: str | None = None) -> tuple[Part, Hollow]:
+    part = require_part(wrapped(made))
+    return part, hollow(part, skin, [face.wrapped for face in made.faces(openings).vals()] if openings else [])
+
+
+def with_nothing_in_it(made: Hollow, wanted: bool = False) -> list[TopoDS_Solid]:
+    """The skin alone, or with all of the core."""
+    return made.solids(split(made.core, []), (), lambda point: wanted)
+
+
+def volume(solids: list[TopoDS_Solid]) -> float:
+    return sum(measure(solid)[0] for solid in solids)
+
+
+def areas_at(shape: TopoDS_Shape, height: float) -> list[float]:
+    """Of the faces that lie in the plane z = height."""
+    faces = [cq.Face(TopoDS.Face_s(face)) for face in parts_of(shape, TopAbs_FACE)]
+    return [face.Area() for face in faces if abs(face.BoundingBox().zmin - height) + face.BoundingBox().zlen < 1e-4]
+
+
+def assert_sound(shape: TopoDS_Shape) -> None:
+    assert is_valid(shape)
+    assert topology(shape).closed
+
+
+@lru_cache(maxsize=4)
+def filled(name: str) -> tuple[Part, Hollow, TopoDS_Shape, TopoDS_Shape]:
+    """A part, its core, skin with wall, and the wall in the core alone."""
+    part, made = parted(*{"ball": (ball(),), "box": (box(), SKIN, ">Z")}[name])
+    core = made.core
+    complex = covering_complex(core.low, core.high, FRAME, CELL, WALL / 2)
+    cloud, error = core.surface_samples(CELL / 12)
+    tree = cKDTree(cloud)
+    sides = patch_sides(complex, FRAME, CELL, WALL / 2, lambda points: tree.query(points)[0] - error, core.holds)
+    wall = build_wall(complex, fit_patch(FitSettings(6)), CELL, WALL).moved(FRAME.rotation, FRAME.origin)
+    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in realise_faces(wall)]
+    cut, whole = (
+        [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
+    )
+    pieces = split(core, cut)
+
+    def never(point: Floats) -> bool:
+        raise AssertionError("asked")
+
+    return (
+        part,
+        made,
+        compound_of(made.solids(pieces, whole, never)),
+        compound_of(bounded_solids(pieces, whole, never)),
+    )
+
+
+@pytest.mark.parametrize("name", ["ball", "box"])
+def test_a_filled_skin_is_the_skin_and_the_lattice_in_its_core(name: str) -> None:
+    part, made, ours, lattice = filled(name)
+    assert_sound(ours)
+    assert topology(ours).solids == 1
+    assert measure(ours)[0] == pytest.approx(part.volume - made.core.volume + measure(lattice)[0], rel=1e-6)
+
+
+def test_a_balls_core_is_a_ball_and_its_outer_faces_stay_whole() -> None:
+    part, made, ours, _ = filled("ball")
+    assert made.core.volume == pytest.approx(4 / 3 * np.pi * (RADIUS - SKIN) ** 3, rel=1e-6)
+    own = list(parts_of(ours, TopAbs_FACE))
+    assert all(any(face.IsSame(one) for one in own) for face in parts_of(part.shape, TopAbs_FACE))
+
+
+def test_at_an_opening_the_lattice_and_what_it_leaves_come_to_the_surface() -> None:
+    _, made, ours, lattice = filled("box")
+    length, width, height = SIDES
+    within = (length - 2 * SKIN) * (width - 2 * SKIN)
+    assert made.core.volume == pytest.approx(within * (height - SKIN), rel=1e-6)
+    ends = sum(areas_at(lattice, 5 + height / 2))
+    assert 0.1 * within < ends < 0.5 * within
+    assert sum(areas_at(ours, 5 + height / 2)) == pytest.approx(length * width - within + ends, rel=1e-6)
+    assert sum(areas_at(ours, 5 - height / 2)) == pytest.approx(length * width)
+
+
+def test_it_survives_a_step_file(tmp_path: Path) -> None:
+    _, _, ours, _ = filled("box")
+    write_step(ours, tmp_path / "box.step", parameter_curves=True)
+    back = read_step(tmp_path / "box.step")
+    assert_sound(back)
+    assert topology(back) == topology(ours)
+    assert measure(back)[0] == pytest.approx(measure(ours)[0], rel=1e-6)
+
+
+def rounded(length: float, width: float, radius: float) -> float:
+    """Area of a rectangle with rounded corners."""
+    return length * width - (4 - np.pi) * radius**2
+
+
+# Of the plate's core, seen from above.
+PLATE = rounded(18, 14, 2) - np.pi * 3.5**2
+
+
+@pytest.mark.parametrize(
+    ("made", "openings", "core", "solids"),
+    [
+        (plate(), None, 4 * PLATE, 1),
+        (plate(), ">Z", 5 * PLATE, 1),
+        (plate(), ">Z or <Z", 6 * PLATE, 1),
+        (plate(), ">X", 4 * PLATE + (10 - 2) * (6 - 2), 1),
+        (box(), ">Z or >X", 8 * 6 * 6, 1),
+        (cq.Workplane().circle(6).extrude(14), "%CYLINDER", 36 * np.pi * 12, 1),
+        (cq.Workplane(obj=cq.Solid.makeTorus(10, 4)), None, 2 * np.pi**2 * 10 * 9, 1),
+        (box().cut(ball(1.5)), None, 7 * 6 * 5 - 4 / 3 * np.pi * 2.5**3, 1),
+        (box().cut(ball(1.5)), ">Z", 7 * 6 * 6 - 4 / 3 * np.pi * 2.5**3, 1),
+        (ball().add(ball().translate((10, 0, 0))), None, 8 / 3 * np.pi * 27, 2),
+        (dumb_bell(), None, None, 2),
+    ],
+    ids=["plate", "top", "both", "side", "corner", "mantle", "torus", "void", "open void", "two", "dumb bell"],
+)
+def test_skin_and_core_are_the_part(made: cq.Workplane, openings: str | None, core: float | None, solids: int) -> None:
+    part, found = parted(made, SKIN, openings)
+    skin = with_nothing_in_it(found)
+    assert_sound(compound_of(skin))
+    assert_sound(found.core.shape)
+    assert len(found.core.solids) == solids
+    if core is not None:
+        assert found.core.volume == pytest.approx(core, rel=1e-5)
+    assert volume(skin) == pytest.approx(part.volume - found.core.volume, rel=1e-5)
+    assert any(found.opened) == bool(openings)
+    everything = with_nothing_in_it(found, True)
+    assert_sound(compound_of(everything))
+    assert volume(everything) == pytest.approx(part.volume, rel=1e-6)
+
+
+def test_openings_are_found_where_the_part_has_other_faces_than_the_shape_it_was_made_from() -> None:
+    cylinder = cq.Workplane().circle(6).extrude(14)
+    part = require_part(wrapped(cylinder))
+    mantle = cylinder.faces("%CYLINDER").val()
+    for given in (mantle, mantle.copy()):
+        found = openings_of(part, [given.wrapped, given.wrapped])
+        assert len(found) == 2
+        assert sum(measure(face)[1] for face in found) == pytest.approx(mantle.Area())
+    assert openings_of(part, []) == []
+
+
+@pytest.mark.parametrize(
+    ("made", "skin", "openings", "words"),
+    [
+        (box(), 3.6, [], "skin = 3.6: expected less than about 3.5 mm, half the part where it is thickest"),
+        (box(), 3.9, box().faces(">X or <X").vals(), "skin = 3.9: expected less than about 3.5 mm, as deep as"),
+        (box(), 1.0, box().faces().vals(), "some faces of each solid"),
+        (box(), 1.0, ball().faces().vals(), "openings = '1 face': expected faces of the part"),
+        (box(), 1.0, box().translate((0, 0, 0.01)).faces(">Z").vals(), "expected faces of the part"),
+        (
+            flanged(),
+            1.0,
+            flanged().faces(">X or <Z").vals(),
+            "openings = '2 faces': expected faces wider than rims of 1 mm",
+        ),
+    ],
+)
+def test_what_leaves_no_core_no_skin_or_no_opening_is_refused(
+    made: cq.Workplane, skin: float, openings: list[cq.Face], words: str
+) -> None:
+    with pytest.raises(ParameterError) as caught:
+        hollow(require_part(wrapped(made)), skin, [face.wrapped for face in openings])
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("given", [None, box(), cq.Workplane(origin=(5, 5, 5)).box(7.2, 6, 5), ball(2.5)])
+def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatch, given: cq.Workplane | None) -> None:
+    def wrong(*arguments: Any) -> Iterator[TopoDS_Shape | None]:
+        yield from len(CLOSED_WAYS) * [None if given is None else wrapped(given)]
+
+    monkeypatch.setattr(gyroid_cad.kernel.core, "offsets", wrong)
+    with pytest.raises(KernelError, match="cannot offset the part by 1 mm; without a skin it can still be filled"):
+        parted(box())
+
+
+@pytest.mark.parametrize("fault", ["import os; os.abort()", "import time; time.sleep(60)", "raise SystemExit"])
+def test_a_way_that_crashes_or_does_not_end_gives_nothing(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "_WORK", fault)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "_SECONDS_AT_MOST", 0.3)
+    (solid,) = require_part(wrapped(box())).solids
+    assert list(offsets(solid, [], SKIN, list(CLOSED_WAYS)[:2])) == [None, None]
+
+
+def test_one_way_that_fails_does_not_keep_the_next_from_being_tried() -> None:
+    (solid,) = require_part(wrapped(box())).solids
+    nothing, core = offsets(solid, [], SKIN, ["no such way", "sharp"])
+    assert nothing is None
+    assert core is not None
+    assert measure(core)[0] == pytest.approx(7 * 6 * 5)
+
+
+def test_a_part_is_as_deep_as_the_largest_ball_in_it() -> None:
+    (solid,) = require_part(wrapped(plate())).solids
+    assert Depths(solid, []).deepest(10.0) == pytest.approx(3.0, rel=0.01)

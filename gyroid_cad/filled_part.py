@@ -182,7 +182,7 @@ class Filling:
             with self.timed("join"):
                 if region.surface:
                     shapes: list[Any] = shells_of([*pieces.inside, *whole])
-                elif self.hollow is None:
+                elif self.hollow is None or region.fluid:
                     shapes = list(bounded_solids(pieces, whole, wanted_at))
                 else:
                     shapes = list(self.hollow.solids(pieces, whole, wanted_at))
@@ -209,7 +209,7 @@ class Filling:
         else:
             hits = int(np.sum(infill.holds(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
-        skin = 0.0 if self.hollow is None else self.part.volume - self.core.volume
+        skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
         size = sum(_size(piece) for piece in made) - skin
         expected, deviation = hits * box, np.sqrt(hits + 1) * box
         if not abs(size - expected) <= _ESTIMATE_DEVIATIONS * deviation + _ESTIMATE_ERROR * expected:

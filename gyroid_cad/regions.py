@@ -32,12 +32,15 @@ class Region:
         In half walls along the common normal; None where there is no end.
     surface : bool
         Whether it is not space at all, but the mid-surface alone.
+    fluid : bool
+        Whether it is what the wall leaves: then a skin bounds it, and is no part of it.
     """
 
     name: str
     lowest: float | None
     highest: float | None
     surface: bool = False
+    fluid: bool = False
 
     def holds(self, offsets: Floats, halves: Floats) -> Booleans:
         """Which offsets, in mm, lie between, where the half wall is so many mm."""
@@ -97,7 +100,7 @@ def regions_of(kind: str, cell_size: float, thickness: FieldLike | None, density
     if kind in (NETWORK_A, NETWORK_B):
         return _network(kind, cell_size, density)
     regions = (
-        (Region("channel-a", 1.0, None), Region("channel-b", None, -1.0))
+        (Region("channel-a", 1.0, None, fluid=True), Region("channel-b", None, -1.0, fluid=True))
         if kind == CHANNELS
         else (Region(SHEET, -1.0, 1.0),)
     )

@@ -13,7 +13,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs import basis
@@ -34,9 +33,9 @@ _RIM_SAMPLES = 65
 # In the square, whose sides are 2 long; finer where a curve is not followed to an exit.
 _STEPS = (0.1, 0.025, 0.006)
 _LONGEST = 24.0
-# Cubic splines through so many stations; the fewest that are close enough.
-_STATIONS = (16, 24, 32, 48, 64, 128)
-_CLOSE = 4e-7
+# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
+_STATIONS = (16, 32, 64, 128)
+_CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
 _NEWTON_STEPS = 8
 # A gradient across a side, or of the coordinate itself, that small means that face and plane touch.
 _TOUCHING = 1e-7
@@ -254,7 +253,7 @@ def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
     else:
         raise KernelError("a face of the lattice touches the box: where they cross cannot be followed")
     ways = [np.vstack([path[:-1], rims.places[end]]) for path, end in zip(paths, ends.tolist(), strict=True)]
-    return _fitted_closely(faces, rims, starts, ends, ways, _CLOSE * size)
+    return _fitted_closely(faces, rims, starts, ends, ways, size)
 
 
 def _rate_along(side: Integers, slopes: Floats) -> Floats:
@@ -330,7 +329,7 @@ def _exits(rims: Rims, starts: Integers, paths: list[Floats], reach: float) -> I
 
 
 def _fitted_closely(
-    faces: Faces, rims: Rims, starts: Integers, ends: Integers, ways: list[Floats], limit: float
+    faces: Faces, rims: Rims, starts: Integers, ends: Integers, ways: list[Floats], size: float
 ) -> Sections:
     """Each curve with as few control points as keep the one in the square and the one in space together."""
     face, plane = rims.face[starts], rims.plane[starts]
@@ -344,9 +343,9 @@ def _fitted_closely(
         for index, curve in enumerate(left.tolist()):
             found.parameters[curve], found.points[curve] = parameters[index], points[index]
         found.deviation[left] = deviation
-        left = left[deviation > limit]
-    if len(left):
-        worst = found.deviation.max()
+        left = left[deviation > _CLOSE * size]
+    worst = found.deviation.max(initial=0.0)
+    if worst > _NEAR_ENOUGH * size:
         raise KernelError(f"a curve where the lattice crosses the box was fitted to {worst:.2g} mm only")
     return found
 
@@ -355,17 +354,18 @@ def _fitted(
     faces: Faces, face: Integers, plane: Integers, ways: list[Floats], count: int
 ) -> tuple[Floats, Floats, Floats]:
     """Control points in the square and in space, and how far the two curves are from each other."""
-    t = np.linspace(0, 1, count + 1)
-    stations = np.array([_spread_evenly(way, t) for way in ways])
+    even = np.linspace(0, 1, count + 1)
+    stations = np.array([_spread(way, _run(way), even) for way in ways])
     points = _onto_level(faces, face, plane, stations)
-    chords = np.linalg.norm(np.diff(points, axis=1), axis=-1)
-    run = np.concatenate([np.zeros((len(face), 1)), np.cumsum(chords, axis=1)], axis=1)
-    stations = np.array([CubicSpline(s / s[-1], way)(t) for s, way in zip(run, stations, strict=True)])
+    # Evenly spread in the square, then in space.
+    stations = np.array([_spread(way, _run(some), even) for way, some in zip(stations, points, strict=True)])
     stations[:, [0, -1]] = [[way[0], way[-1]] for way in ways]
     points = _onto_level(faces, face, plane, stations)
-    through = np.linalg.inv(basis(section_knots(count + 1), 3, t))
-    control = through @ np.concatenate([stations, points], axis=-1)
-    between = basis(section_knots(count + 1), 3, (t[1:] + t[:-1]) / 2) @ control
+    # Parameters by chord length: nearly even, and smooth however the stations are not quite so.
+    t = np.array([_run(some) for some in points])
+    through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
+    control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
+    between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
     exact = faces.derivatives(face, between[..., 0], between[..., 1])[0]
     deviation = np.linalg.norm(exact - between[..., 2:], axis=-1).max(axis=1)
     return control[..., :2], control[..., 2:], deviation
@@ -383,6 +383,12 @@ def _onto_level(faces: Faces, face: Integers, plane: Integers, stations: Floats)
     return points
 
 
-def _spread_evenly(way: Floats, t: Floats) -> Floats:
-    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
-    return np.stack([np.interp(t * run[-1], run, way[:, axis]) for axis in (0, 1)], axis=-1)
+def _run(points: Floats) -> Floats:
+    """Length of the chords up to each point, in parts of all."""
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.asarray(run / run[-1])
+
+
+def _spread(way: Floats, run: Floats, t: Floats) -> Floats:
+    """Places of a way in the square at parameters t, where its own points have parameters ``run``."""
+    return np.stack([np.interp(t, run, way[:, axis]) for axis in (0, 1)], axis=-1)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.gp import gp_Pnt
-from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
     TopoDS,
@@ -78,8 +78,8 @@ def realise_patches(wall: Wall) -> list[list[TopoDS_Face]]:
 
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
     """The same topology and geometry under a handle of its own: moving one does not move the other."""
-    twin = shape.Located(TopLoc_Location())
-    return TopoDS.Solid_s(twin) if twin.ShapeType() == TopAbs_SOLID else TopoDS.Compound_s(twin)
+    casts = {TopAbs_SOLID: TopoDS.Solid_s, TopAbs_SHELL: TopoDS.Shell_s, TopAbs_COMPOUND: TopoDS.Compound_s}
+    return casts[shape.ShapeType()](shape.Located(TopLoc_Location()))
 
 
 class _Realisation:

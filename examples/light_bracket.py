@@ -23,4 +23,5 @@ if __name__ == "__main__":
     light.write("bracket_light.step")
     skinned = fill("bracket.step", **material, skin=1.0, openings=[">X"])
     skinned.write("bracket_with_skin.step")
-    print(f"solid {light.report.part_mass:.2f} g, filled {light.report.mass:.2f} g, with skin {skinned.report.mass:.2f} g")
+    masses = [light.report.part_mass, light.report.mass, skinned.report.mass]
+    print("solid {:.2f} g, filled {:.2f} g, with skin {:.2f} g".format(*masses))

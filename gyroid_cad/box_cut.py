@@ -352,7 +352,8 @@ class _Assembly:
                 numbers.append(self._numbered((3, *end), corner))
             else:
                 numbers.append(end)
-        key = (1, *numbers)
+        # Sides of the wall are 0 and 1: no rim has such a key.
+        key = (2, *numbers)
         if key not in self.edge_ids:
             self.edge_ids[key] = len(self.edges)
             self.edges.append(BoxEdge(numbers[0], numbers[1], 0.0, 1.0))

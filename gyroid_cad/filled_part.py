@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.box_cut import Box, BoxedWall, cut_to_box
+from gyroid_cad.box_cut import BoxedWall, cut_to_box
 from gyroid_cad.covering import CROSSING, INSIDE, PHASES, Frame
 from gyroid_cad.errors import KernelError
 from gyroid_cad.infill import Infill
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Filling", "Made", "Outcome"]
 
 Floats = NDArray[np.float64]
+Point = tuple[float, float, float]
 
 # Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
 _BOUNDARY_SPACING = 1 / 12
@@ -111,11 +112,17 @@ class Filling:
         with self.timed("cover"):
             points = points[self.core.holds(points)]
         problem: KernelError | None = None
-        # The last time in one process: should it be the joining of regions that fails.
-        for phase, processes in zip(PHASES, (None, None, 1), strict=True):
+        # Booleans the last time in one process: should it be the joining of regions that fails.
+        attempts: list[tuple[Point, bool, int | None]] = [
+            (phase, False, processes) for phase, processes in zip(PHASES, (None, None, 1), strict=True)
+        ]
+        if self.core.box is not None and self.hollow is None:
+            # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
+            attempts = [(phase, True, None) for phase in PHASES] + attempts
+        for phase, by_sections, processes in attempts:
             shift = np.array(phase) * self.cell_size
             try:
-                return self._filled(replace(frame, origin=frame.origin + shift), shift, points, processes)
+                return self._filled(replace(frame, origin=frame.origin + shift), shift, points, by_sections, processes)
             except KernelError as failed:
                 problem = problem or failed
         raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
@@ -123,10 +130,11 @@ class Filling:
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
 
-    def _filled(self, frame: Frame, shift: Floats, points: Floats, processes: int | None) -> Outcome:
+    def _filled(self, frame: Frame, shift: Floats, points: Floats, by_sections: bool, processes: int | None) -> Outcome:
         infill = self.infill_in(frame, self.timed)
-        box = self.core.box if infill.endless and self.hollow is None else None
-        made, cut, whole = self._by_booleans(infill, processes) if box is None else self._by_sections(infill, box)
+        # A block's own side walls are none of the faces that sections are found of.
+        by_sections = by_sections and infill.endless
+        made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
         with self.timed("check"):
             for region in self.regions:
                 self._require_right_size(infill, region, made[region.name], points)
@@ -134,12 +142,14 @@ class Filling:
             if not domains:
                 raise KernelError("nothing of the lattice lies in the part")
             self._require_sound(piece.shape for some in domains.values() for piece in some)
-        return Outcome(domains, infill, shift, cut, whole, box is not None)
+        return Outcome(domains, infill, shift, cut, whole, by_sections)
 
-    def _by_sections(self, infill: Infill, box: Box) -> tuple[dict[str, list[Made]], int, int]:
+    def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
         """Of a box, whose sides are planes: cut without the kernel."""
         from gyroid_cad.kernel.boxed import realise_boxed
 
+        box = self.core.box
+        assert box is not None
         corner = (box.axes @ box.low)[np.newaxis]
         made, cut, whole = {}, 0, 0
         for region in self.regions:

@@ -115,12 +115,30 @@ def test_islands_are_counted_and_dropped_on_request() -> None:
 def test_a_box_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
     box = cq.Workplane().box(4, 5, 3).translate((5, 4, 6))
     sections = fill(box, CELL, WALL, fit=COARSE).report
-    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill, box: self._by_booleans(infill))
+    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill: self._by_booleans(infill))
     booleans = fill(box, CELL, WALL, fit=COARSE).report
     assert sections.by_sections
     assert sections.volume == pytest.approx(booleans.volume, rel=1e-5)
     assert sections.area == pytest.approx(booleans.area, rel=1e-5)
     assert (sections.solids, sections.faces) == (booleans.solids, booleans.faces)
+
+
+@pytest.mark.parametrize("side", [1.0, 2.0, 4.0])
+def test_small_boxes_at_the_origin_are_cut_as_large_ones_are(side: float) -> None:
+    box = cq.Workplane().box(side, side, side, centered=False)
+    both = [fill(box, 7.0, 0.6, kind=kind, fit=COARSE).report for kind in ("sheet", "channels")]
+    assert all(report.by_sections for report in both)
+    assert sum(report.volume for report in both) == pytest.approx(side**3, rel=1e-6)
+
+
+def test_a_box_that_cannot_be_cut_by_sections_goes_to_the_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(self: Filling, infill: Any) -> Any:
+        raise KernelError("touches")
+
+    monkeypatch.setattr(Filling, "_by_sections", failing)
+    report = fill(cq.Workplane().box(4, 5, 3).translate((5, 4, 6)), CELL, WALL, fit=COARSE).report
+    assert not report.by_sections
+    assert report.valid
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (20, 30, 40)])

@@ -17,11 +17,12 @@ def bracket() -> cq.Workplane:
 
 
 if __name__ == "__main__":
-    cq.exporters.export(bracket(), "bracket.step")
+    part = "bracket.step"
+    cq.exporters.export(bracket(), part)
     material = {"cell_size": 8, "density": 0.30, "material_density": 2.7}
-    light = fill("bracket.step", **material)
+    light = fill(part, **material)
     light.write("bracket_light.step")
-    skinned = fill("bracket.step", **material, skin=1.0, openings=[">X"])
+    skinned = fill(part, **material, skin=1.0, openings=[">X"])
     skinned.write("bracket_with_skin.step")
     masses = [light.report.part_mass, light.report.mass, skinned.report.mass]
     print("solid {:.2f} g, filled {:.2f} g, with skin {:.2f} g".format(*masses))

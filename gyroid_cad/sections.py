@@ -37,6 +37,11 @@ _LONGEST = 24.0
 _STATIONS = (16, 32, 64, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
 _NEWTON_STEPS = 8
+_LEAST_OWN = 1e-3
+# A curve in the square that swings out so far is no fit.
+_WIDEST = 1.1
+# Of Newton's method in the square: near a saddle it would leap out of where the face is defined.
+_LONGEST_STEP = 0.1
 # A gradient across a side, or of the coordinate itself, that small means that face and plane touch.
 _TOUCHING = 1e-7
 
@@ -302,8 +307,11 @@ def _along(faces: Faces, face: Integers, plane: Integers, place: Floats) -> Floa
 
 
 def _towards(height: Floats, slopes: Floats) -> Floats:
-    """A Newton step back to the level curve, straight across it."""
-    return np.asarray(-slopes * (height / np.sum(slopes * slopes, axis=-1))[..., np.newaxis])
+    """A Newton step back to the level curve, straight across it; short where the face all but touches the plane."""
+    steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
+    step = -slopes * (height / steepness)[..., np.newaxis]
+    length = np.linalg.norm(step, axis=-1, keepdims=True)
+    return np.asarray(step * np.minimum(1.0, _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)))
 
 
 def _exits(rims: Rims, starts: Integers, paths: list[Floats], reach: float) -> Integers | None:
@@ -345,7 +353,7 @@ def _fitted_closely(
         found.deviation[left] = deviation
         left = left[deviation > _CLOSE * size]
     worst = found.deviation.max(initial=0.0)
-    if worst > _NEAR_ENOUGH * size:
+    if not worst <= _NEAR_ENOUGH * size:
         raise KernelError(f"a curve where the lattice crosses the box was fitted to {worst:.2g} mm only")
     return found
 
@@ -364,11 +372,15 @@ def _fitted(
     # Parameters by chord length: nearly even, and smooth however the stations are not quite so.
     t = np.array([_run(some) for some in points])
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
+    # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
+    crowded = np.diagonal(through, axis1=1, axis2=2).min(axis=1) < _LEAST_OWN
+    through[crowded] = np.eye(count + 1)
     control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
     between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
-    exact = faces.derivatives(face, between[..., 0], between[..., 1])[0]
+    astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
+    exact = faces.derivatives(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))[0]
     deviation = np.linalg.norm(exact - between[..., 2:], axis=-1).max(axis=1)
-    return control[..., :2], control[..., 2:], deviation
+    return control[..., :2], control[..., 2:], np.where(crowded | astray, np.inf, deviation)
 
 
 def _onto_level(faces: Faces, face: Integers, plane: Integers, stations: Floats) -> Floats:

@@ -167,9 +167,9 @@ def block_infill(lattice: Lattice, frame: Frame) -> Infill:
     frame : Frame
         Where the lattice's own origin stands.
     """
-    built = lattice.built()
-    wall = built.wall.moved(frame.rotation, frame.origin)
-    return Infill(frame, built.recipe.grading, built.complex, wall, built.thinnest, built.thickest, False)
+    laid = lattice.laid()
+    wall = laid.wall.moved(frame.rotation, frame.origin)
+    return Infill(frame, laid.recipe.grading, laid.complex, wall, laid.thinnest, laid.thickest, False)
 
 
 def _in_frame(value: float | Field | None, frame: Frame) -> float | Field | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 from numpy.typing import ArrayLike
 
 from gyroid_cad.block_maps import as_map, space_over
-from gyroid_cad.build import Build, Recipe, build, require_formats, require_settings
+from gyroid_cad.build import Build, build, require_formats, require_settings
 from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
@@ -20,6 +20,7 @@ from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
 from gyroid_cad.fields import Field, FieldLike, as_field
 from gyroid_cad.fit import FitSettings, fit_within
 from gyroid_cad.grading import Grading
+from gyroid_cad.laying import LaidWall, Recipe, laid_wall
 from gyroid_cad.limits import (
     require_cell_size,
     require_density,
@@ -204,11 +205,11 @@ class Lattice:
         FitError
             If the fit's edges do not meet those of its neighbours.
         """
-        return self.built().wall
+        return self.laid().wall
 
     def bounding_box(self) -> tuple[Corner, Corner]:
         """Lowest and highest corner of the box round the wall, in mm."""
-        low, high = self.built().bounding_box
+        low, high = (corner.tolist() for corner in self.laid().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:
@@ -281,16 +282,23 @@ class Lattice:
         limit = None if deviation is None else finite_number("deviation", deviation, _LENGTH)
         require_settings(self.cells, schema, limit, angle)
         built = self.built(progress)
-        usual = min(self.cell_size / 1000, built.thinnest / 10)
+        usual = min(self.cell_size / 1000, built.laid.thinnest / 10)
         built.write(targets, schema, usual if limit is None else limit, angle, progress)
 
     def built(self, progress: Progress | None = None) -> Build:
-        """The build behind everything else: complex, wall, fit and solid."""
+        """The build behind the solid and its files."""
+        return build(self._recipe(), progress)
+
+    def laid(self, progress: Progress | None = None) -> LaidWall:
+        """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""
+        return laid_wall(self._recipe(), progress)
+
+    def _recipe(self) -> Recipe:
         settings = self.fit
         if self.uniform and self.tolerance is not None:
             settings = fit_within(settings, self.tolerance)
         tolerance = self.tolerance or USUAL_TOLERANCE
-        return build(Recipe(self.cells, self._grading(), settings, tolerance, self.trim == BOX), progress)
+        return Recipe(self.cells, self._grading(), settings, tolerance, self.trim == BOX)
 
     def _grading(self) -> Grading:
         if self.uniform:

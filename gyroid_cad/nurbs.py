@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import prod
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +27,7 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 # S . (dS/du x dS/dv) of a cubic surface has degree 8 on each span. A quotient is no polynomial: with the
 # paper's weights, which vary sixfold, so many points leave 1e-12.
@@ -264,7 +266,7 @@ class NurbsSurface:
         return NurbsSurface(moved, self.weights, self.knots_u, self.knots_v)
 
 
-def edge_row(net: Floats, index: int) -> Floats:
+def edge_row(net: NDArray[Scalar], index: int) -> NDArray[Scalar]:
     """The row of a net (its first two axes) that controls border curve ``index``, in running order."""
     return (net[:, 0], net[-1, :], net[::-1, -1], net[0, ::-1])[index]
 

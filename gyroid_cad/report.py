@@ -87,10 +87,11 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
     volume_exact : float, optional
         Of the exact lattice, if it is known.
     """
-    refit, complex = built.refit, built.complex
+    laid = built.laid
+    refit, complex, recipe = laid.refit, laid.complex, laid.recipe
     with built.timed("fit report"):
-        fit = fit_report(fit_patch(built.recipe.settings))
-    cell_size = built.recipe.grading.cell_size
+        fit = fit_report(fit_patch(recipe.settings))
+    cell_size = recipe.grading.cell_size
     return LatticeReport(
         cells=built.cells,
         cell_size=cell_size,
@@ -101,16 +102,16 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
         patches=built.patches,
         faces=built.topology.faces,
         solids=built.topology.solids,
-        control_points=len(built.wall.weights),
+        control_points=len(laid.wall.weights),
         valid=built.valid(),
         closed=built.topology.closed,
-        free_edges=0 if built.recipe.boxed else int(complex.free.sum()),
-        pinch_lines=0 if built.recipe.boxed else complex.pinch_lines,
+        free_edges=0 if recipe.boxed else int(complex.free.sum()),
+        pinch_lines=0 if recipe.boxed else complex.pinch_lines,
         volume=built.volume,
         volume_exact=volume_exact,
         max_deviation=refit.max_deviation if refit else fit.max_distance * cell_size,
         max_wall_error=refit.max_wall_error if refit else None,
         max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,
-        samples_per_patch=built.samples_per_patch,
+        samples_per_patch=laid.samples_per_patch,
         seconds=dict(built.seconds),
     )

@@ -14,13 +14,15 @@ from OCP.TopoDS import TopoDS_Shape
 import gyroid_cad.kernel.check
 import gyroid_cad.kernel.solid
 from gyroid_cad import build as build_module
-from gyroid_cad.build import FORMATS, Build, Progress, Recipe, require_formats, require_settings
+from gyroid_cad import laying, memory
+from gyroid_cad.build import FORMATS, Build, Progress, require_formats, require_settings
 from gyroid_cad.errors import FitError, KernelError, ParameterError
 from gyroid_cad.field_makers import linear
 from gyroid_cad.fields import Field
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.grading import Grading
 from gyroid_cad.kernel.check import Topology, enclosed_volume, topology
+from gyroid_cad.laying import Recipe
 from gyroid_cad.wall import Wall
 
 Realise = Callable[..., TopoDS_Shape]
@@ -44,6 +46,7 @@ def build(
 def forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """No build is remembered from before, nor this one after."""
     monkeypatch.setattr(build_module, "_builds", type(build_module._builds)())
+    monkeypatch.setattr(laying, "_laid", type(laying._laid)())
 
 
 @pytest.fixture
@@ -72,18 +75,19 @@ def test_every_stage_is_told_from_nought_to_done_and_timed() -> None:
 def test_a_wall_that_varies_is_checked_before_it_is_fitted_and_measured_after() -> None:
     made = build(CELLS, 10.0, linear(0.6, x=0.02), COARSE)
     assert list(made.seconds) == ["complex", "soundness", "deviation", "fit", "kernel", "solid", "check"]
-    assert made.refit is not None
-    assert made.refit.control_points == len(made.wall.weights)
-    assert made.samples_per_patch["deviation"] == made.refit.samples**2
-    assert made.thinnest == made.refit.thinnest < made.refit.thickest
+    laid = made.laid
+    assert laid.refit is not None
+    assert laid.refit.control_points == len(laid.wall.weights)
+    assert laid.samples_per_patch["deviation"] == laid.refit.samples**2
+    assert laid.thinnest == laid.refit.thinnest < laid.refit.thickest
 
 
 @pytest.mark.usefixtures("forgotten")
 def test_the_control_points_a_varying_wall_takes_are_asked_of_memory_again(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
-    monkeypatch.setattr(build_module, "_require_memory", lambda cells, size, n=10: asked.append(n))
+    monkeypatch.setattr(laying, "require_memory", lambda cells, size, n=10: asked.append(n))
     made = build_module.build(Recipe(CELLS, Grading(10.0, linear(0.6, x=0.02)), COARSE, 1e-4))
-    assert asked[0] == 4 < asked[-1] == len(made.wall.weights)
+    assert asked[0] == 4 < asked[-1] == len(made.laid.wall.weights)
 
 
 @pytest.mark.usefixtures("forgotten")
@@ -108,7 +112,7 @@ def test_a_build_has_looked_at_its_own_solid(one_build: Build) -> None:
     assert one_build.topology == topology(one_build.solid())
     assert one_build.topology.closed
     assert one_build.volume == enclosed_volume(one_build.solid())
-    assert one_build.volume == pytest.approx(one_build.wall.volume(), rel=1e-12)
+    assert one_build.volume == pytest.approx(one_build.laid.wall.volume(), rel=1e-12)
     assert one_build.valid()
 
 
@@ -129,17 +133,17 @@ def test_more_cells_than_memory_holds_are_refused_in_gigabytes(monkeypatch: pyte
 def test_as_many_cells_as_the_refusal_names_would_have_been_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(psutil, "virtual_memory", lambda: MEMORY)
     with pytest.raises(ParameterError) as caught:
-        build_module._require_memory((1000, 1, 1), 1_500_000)
+        memory.require_memory((1000, 1, 1), 1_500_000)
     most = int(re.findall(r"about (\d+) cells", str(caught.value))[0])
-    build_module._require_memory((most, 1, 1), 1_500_000)
+    memory.require_memory((most, 1, 1), 1_500_000)
     with pytest.raises(ParameterError):
-        build_module._require_memory((most + 1, 1, 1), 1_500_000)
+        memory.require_memory((most + 1, 1, 1), 1_500_000)
 
 
 def test_the_memory_that_files_take_is_asked_for_before_anything_is_built(monkeypatch: pytest.MonkeyPatch) -> None:
     enough_to_build = SimpleNamespace(available=405_000_000)
     monkeypatch.setattr(psutil, "virtual_memory", lambda: enough_to_build)
-    build_module._require_memory(CELLS, 1_500_000)
+    memory.require_memory(CELLS, 1_500_000)
     with pytest.raises(ParameterError, match="GB"):
         require_settings(CELLS, "ap214", 0.01, 15.0)
 

@@ -41,6 +41,8 @@ ROWS = [
     ["box_caps"],
     ["box_cut"],
     ["files"],
+    ["mesh"],
+    ["mesh.places"],
     ["kernel"],
     ["kernel.surfaces"],
     ["kernel.geometry"],
@@ -56,7 +58,8 @@ ROWS = [
     ["kernel.core", "kernel.joining"],
     ["kernel.skin", "kernel.regional"],
     ["kernel.selection"],
-    ["wall_fit"],
+    ["wall_fit", "memory"],
+    ["laying"],
     ["build"],
     ["paper", "limits", "report"],
     ["lattice", "regions"],
@@ -85,7 +88,7 @@ MODULES = {module_name(path): path for path in sorted(FOLDER.rglob("*.py"))}
 
 def imported(module: str) -> set[str]:
     """Every module named by an import statement, wherever in the source it stands, by its full name."""
-    package = "gyroid_cad.kernel" if module.startswith("kernel") else "gyroid_cad"
+    package = ".".join(["gyroid_cad", *module.split(".")[:-1]])
     names = set()
     for node in ast.walk(ast.parse(MODULES[module].read_text())):
         if isinstance(node, ast.Import):

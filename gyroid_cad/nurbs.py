@@ -23,6 +23,7 @@ __all__ = [
     "edge_row",
     "gauss_points",
     "grid_derivatives",
+    "grid_points",
     "uniform_knots",
 ]
 
@@ -306,6 +307,26 @@ def grid_derivatives(
     numerator, numerator_u, numerator_v = (products(*pair, nets * weights[..., np.newaxis]) for pair in pairs)
     points = numerator / weight
     return points, (numerator_u - weight_u * points) / weight, (numerator_v - weight_v * points) / weight
+
+
+def grid_points(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike) -> Floats:
+    """Points of many surfaces of one basis on one grid of parameters (A4.3).
+
+    Parameters
+    ----------
+    nets, weights, knots, u, v
+        As of :func:`grid_derivatives`.
+
+    Returns
+    -------
+    ndarray, shape (..., a, b, 3)
+    """
+    n, m = nets.shape[-3:-1]
+    along_u, along_v = (basis(k, len(k) - count - 1, x) for k, count, x in zip(knots, (n, m), (u, v), strict=True))
+    weighted = nets if np.ptp(weights) == 0 else nets * weights[..., np.newaxis]
+    rows = (along_u @ weighted.reshape(*nets.shape[:-3], n, -1)).reshape(*nets.shape[:-3], len(along_u), m, -1)
+    points = along_v @ rows
+    return np.asarray(points if np.ptp(weights) == 0 else points / (along_u @ weights @ along_v.T)[..., np.newaxis])
 
 
 def _homogeneous(control_points: Floats, weights: Floats) -> Floats:

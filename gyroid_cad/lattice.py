@@ -30,6 +30,9 @@ from gyroid_cad.limits import (
     whole_cells,
 )
 from gyroid_cad.maps import BlockMap
+from gyroid_cad.mesh.hexahedra import Mesh
+from gyroid_cad.mesh.periodic import PeriodicPairs, periodic_pairs
+from gyroid_cad.meshing import hexahedral_mesh, quadrilateral_mesh
 from gyroid_cad.paper import paper_units
 from gyroid_cad.report import LatticeReport, report_of
 from gyroid_cad.stages import Progress
@@ -284,6 +287,40 @@ class Lattice:
         built = self.built(progress)
         usual = min(self.cell_size / 1000, built.laid.thinnest / 10)
         built.write(targets, schema, usual if limit is None else limit, angle, progress)
+
+    def hexahedra(self, subdivisions: int, layers: int = 1, order: int = 1, full: bool = False) -> Mesh:
+        """The wall as structured hexahedra that share their nodes; no kernel is asked.
+
+        Parameters
+        ----------
+        subdivisions : int
+            Elements along each side of a patch; a cell has 24 patches.
+        layers : int
+            Across the wall.
+        order : {1, 2}
+            Elements of 8 nodes, or of 20.
+        full : bool
+            Quadratic elements of 27 nodes.
+
+        Returns
+        -------
+        Mesh
+            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.quality_report`.
+
+        Raises
+        ------
+        ParameterError
+            Also if memory would not do, or an element would be turned inside out.
+        """
+        return hexahedral_mesh(self.laid(), subdivisions, layers, order, full)
+
+    def quadrilaterals(self, subdivisions: int, order: int = 1, full: bool = False) -> Mesh:
+        """The mid-surface as structured quadrilaterals, as of :meth:`hexahedra`; quadratic ones of 8 nodes, or of 9."""
+        return quadrilateral_mesh(self.laid(), subdivisions, order, full)
+
+    def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
+        """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
+        return periodic_pairs(mesh, self.cell_size)
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files."""

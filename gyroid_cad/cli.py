@@ -12,21 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gyroid_cad.cli_fill import fill_command
+from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name, printed_options
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.tables import print_summary, print_table, shown_progress
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
-    from gyroid_cad.lattice import Lattice, LatticeReport
+    from gyroid_cad.lattice import LatticeReport
 
 __all__ = ["main"]
 
 PROGRAM = "gyroid-cad"
 DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
-
-_CONFIG_ENDING = ".toml"
-_OWN_OPTIONS = ("thickness", "density", "scale_field")
-_PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -35,67 +32,9 @@ def commands() -> None:
     """The gyroid as exact-grade CAD solids. Lengths are in millimetres, angles in degrees."""
 
 
-def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
-    """What a file says takes the place of defaults, so that options on the command line override it."""
-    if path is not None and path.lower().endswith(_CONFIG_ENDING):
-        from gyroid_cad.config import read_config
-
-        values = read_config(path, _LATTICE_KEYS)
-        if isinstance(values.get("output"), str):
-            values["output"] = [values["output"]]
-        context.default_map = values
-    return path
-
-
 @commands.command()
-@click.argument("config", required=False, metavar="[LATTICE.toml]", is_eager=True, callback=_defaults_from_file)
 @click.option("-o", "--output", multiple=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated.")
-@click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z.")
-@click.option("--cell-size", type=float, metavar="MM", help="Period of the cubic cell, before it is scaled or mapped.")
-@click.option(
-    "--thickness",
-    metavar="MM",
-    help='Whole wall: a number, below 0.37647 of the cell size, or an expression such as "0.8 + 0.02*x".',
-)
-@click.option(
-    "--density", metavar="RHO", help="Volume fraction instead of thickness, below 0.94033; may be an expression too."
-)
-@click.option(
-    "--scale-field",
-    metavar="EXPRESSION",
-    help='Cells grow by it, such as "1 + 0.01*x": p is moved to scale-field(p) times p. It is not written into '
-    "--cell-size, for that stays the length by which x, y, z and the tolerance are measured.",
-)
-@click.option(
-    "--map",
-    metavar="MAP",
-    help="Of space: cylinder:radius=MM, sphere:radius=MM (both also angle=DEGREES), twist:angle=, bend:angle=.",
-)
-@click.option("--thickness-factor", metavar="T", help="The paper's: whole wall in BC units, instead of --thickness.")
-@click.option("--bc-length", metavar="B", help="The paper's: length of a bounding cell, instead of --cell-size.")
-@click.option("--scale", type=float, metavar="MM", help="Millimetres per unit of BC length; 1 if left out.")
-@click.option("--trim", metavar="SHAPE", help="box: cut to the block of cells, flat sides instead of whole patches.")
-@click.option(
-    "--tolerance",
-    type=float,
-    metavar="PART",
-    help="Largest deviation in cell sizes; 1e-4 if left out where the lattice varies.",
-)
-@click.option(
-    "--control-points",
-    type=int,
-    default=10,
-    show_default=True,
-    metavar="N",
-    help="Of a patch, along a side; more are taken where the tolerance asks for them.",
-)
-@click.option(
-    "--fit",
-    type=click.Choice(["smooth", "paper"]),
-    default="smooth",
-    show_default=True,
-    help="The paper's own leaves gaps between patches, and is refused with their size.",
-)
+@lattice_options
 @click.option(
     "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
 )
@@ -109,7 +48,7 @@ def _defaults_from_file(context: click.Context, parameter: click.Parameter, path
 @click.option("--print-config", is_flag=True, help="Print the lattice as TOML, ready for LATTICE.toml; build nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 @click.option("--quiet", is_flag=True, help="Print no table and no progress.")
-def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
+def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     """Build a lattice as a closed solid and write it.
 
     Expressions are of x, y and z in mm, of places in the lattice before anything is moved; pi and functions
@@ -124,15 +63,11 @@ def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **
     gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
     """
     start = time.perf_counter()
-    if config is not None and not config.lower().endswith(_CONFIG_ENDING):
-        raise click.UsageError(f"Got unexpected extra argument '{config}'; a lattice in a file ends in .toml.")
     if not (given["output"] or print_config):
         raise click.UsageError("Missing option '-o' / '--output'.")
-    lattice = _lattice(given)
+    lattice = lattice_of(given)
     if print_config:
-        from gyroid_cad.config import printed_config
-
-        click.echo(printed_config({p.name: given[p.name] for p in build.params if p.name in given}), nl=False)
+        click.echo(printed_options(), nl=False)
         return
     outputs = given["output"]
     settings = {name: given[name] for name in ("schema", "deviation", "angle")}
@@ -144,34 +79,6 @@ def build(config: str | None, print_config: bool, as_json: bool, quiet: bool, **
         click.echo(json.dumps(summary))
     elif not quiet:
         print_summary(summary)
-
-
-_LATTICE_KEYS = frozenset(p.name for p in build.params if p.name) - {"config", "print_config", "as_json", "quiet"}
-
-
-def _lattice(given: dict[str, Any]) -> Lattice:
-    """The lattice that the options describe, in millimetres or in the paper's units."""
-    from gyroid_cad.lattice import Lattice
-
-    if given["cells"] is None:
-        raise click.UsageError("Missing option '--cells'.")
-    fit = _fit_settings(given["fit"], given["control_points"])
-    if any(given[name] is not None for name in _PAPER_OPTIONS):
-        mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map", "trim") if given[name] is not None]
-        if mixed or given["thickness_factor"] is None:
-            options = ", ".join(map(_option, _PAPER_OPTIONS))
-            raise click.UsageError(
-                f"{options} are the paper's units: they need --thickness-factor, and not "
-                + ", ".join(map(_option, mixed or (*_OWN_OPTIONS, "cell_size", "map", "trim")))
-            )
-        units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
-        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"])
-    if given["cell_size"] is None:
-        raise click.UsageError("Missing option '--cell-size'.")
-    if (given["thickness"] is None) == (given["density"] is None):
-        raise click.UsageError("give exactly one of --thickness and --density")
-    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
-    return Lattice(given["cells"], given["cell_size"], **own, fit=fit)
 
 
 commands.add_command(fill_command)
@@ -250,22 +157,7 @@ def _fail(message: str, status: int) -> int:
 def _with_option_name(problem: ParameterError) -> str:
     if not problem.parameter.isidentifier() or problem.parameter == "config":
         return str(problem)
-    return str(problem).replace(problem.parameter, _option(problem.parameter), 1)
-
-
-def _option(parameter: str) -> str:
-    return "-o" if parameter == "output" else "--" + parameter.replace("_", "-")
-
-
-def _fit_settings(fit: str, control_points: int) -> Any:
-    from gyroid_cad.fit import FitSettings
-
-    if fit == "smooth":
-        return FitSettings(control_points)
-    settings = FitSettings.paper()
-    if control_points != settings.control_points:
-        raise ParameterError("control_points", control_points, "10, the paper's own, with --fit paper")
-    return settings
+    return str(problem).replace(problem.parameter, option_name(problem.parameter), 1)
 
 
 def _summary(report: LatticeReport, outputs: Sequence[str], total: float) -> dict[str, Any]:

@@ -18,6 +18,7 @@ import pytest
 
 from gyroid_cad import __version__
 from gyroid_cad import build as build_module
+from gyroid_cad import memory
 from gyroid_cad.cli import main
 from gyroid_cad.fit import FitSettings, fit_patch, fit_report
 from gyroid_cad.kernel.check import topology
@@ -193,7 +194,7 @@ def test_more_cells_than_memory_holds_are_bad_usage_counted_in_gigabytes(capsys:
 def test_memory_that_suffices_for_the_solid_but_not_for_its_file_is_the_same_error(
     capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    between = build_module._BASE_BYTES + (build_module._SOLID_BYTES_PER_CELL + build_module._FILE_BYTES_PER_CELL) / 2
+    between = memory._BASE_BYTES + (build_module._SOLID_BYTES_PER_CELL + build_module._FILE_BYTES_PER_CELL) / 2
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=between))
     run = in_process(capsys, "build", "-o", tmp_path / "a.step", *ONE_CELL, *WALL, *COARSE)
     assert_failed(run, 2, tmp_path, "--cells = (1, 1, 1)", "GB are free")

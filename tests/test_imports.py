@@ -74,6 +74,7 @@ ROWS = [
     ["__init__"],
     ["cq_plugin", "bd_objects", "progress", "config"],
     ["tables"],
+    ["cli_lattice"],
     ["cli_fill"],
     ["cli"],
     ["__main__"],

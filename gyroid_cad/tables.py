@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-__all__ = ["print_fill", "print_summary", "print_table", "shown_progress"]
+__all__ = ["print_fill", "print_mesh", "print_summary", "print_table", "shown_progress"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -64,6 +64,28 @@ def print_fill(summary: dict[str, Any]) -> None:
         *([("shifted by", f"{summary['shift']} mm: the kernel failed without")] if any(summary["shift"]) else []),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
         ("time", f"{summary['seconds']['total']:.2f} s"),
+    ]
+    print_table(None, rows)
+
+
+def print_mesh(summary: dict[str, Any]) -> None:
+    """Print how many elements and nodes a mesh has, its files and the time it took.
+
+    Parameters
+    ----------
+    summary : dict
+        With ``element``, ``elements``, ``nodes``, ``patches``, ``subdivisions``, ``layers``, ``periodic_pairs``,
+        ``files`` and ``seconds``.
+    """
+    n, layers = summary["subdivisions"], summary["layers"]
+    across = f"{layers} across the wall" if layers else "of the mid-surface"
+    rows = [
+        ("elements", f"{summary['elements']:,} {summary['element']}: {n} x {n} a patch, {across}"),
+        ("nodes", f"{summary['nodes']:,}"),
+        ("patches", f"{summary['patches']:,}"),
+        *([("periodic pairs", f"{summary['periodic_pairs']:,}")] if layers else []),
+        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
+        ("time", f"{summary['seconds']:.2f} s"),
     ]
     print_table(None, rows)
 

@@ -16,9 +16,8 @@ from typing import Any
 import psutil
 import pytest
 
-from gyroid_cad import __version__
+from gyroid_cad import __version__, memory
 from gyroid_cad import build as build_module
-from gyroid_cad import memory
 from gyroid_cad.cli import main
 from gyroid_cad.fit import FitSettings, fit_patch, fit_report
 from gyroid_cad.kernel.check import topology

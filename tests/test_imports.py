@@ -75,7 +75,7 @@ ROWS = [
     ["cq_plugin", "bd_objects", "progress", "config"],
     ["tables"],
     ["cli_lattice"],
-    ["cli_fill"],
+    ["cli_fill", "cli_mesh"],
     ["cli"],
     ["__main__"],
 ]

@@ -45,10 +45,10 @@ def quadrilateral_corner_measures(corners: Floats) -> Measures:
     With edges e_k from corner k to corner k + 1, corner normals N_k = e_(k-1) x e_k, principal axes
     X_1 = e_0 - e_2, X_2 = e_1 - e_3 and n their unit normal:
 
-    - scaled_jacobian: least N_k . n / (\\|e_(k-1)\\| \\|e_k\\|)
+    - scaled_jacobian: least N_k . n / (|e_(k-1)| |e_k|)
     - aspect_ratio: longest edge times perimeter over 4 areas, the area being the sum of N_k . n over 4
     - edge_ratio: longest over shortest edge
-    - skew: \\|cos(X_1, X_2)\\|
+    - skew: |cos(X_1, X_2)|
     - warpage: 1 - min(cos(N_0, N_2), cos(N_1, N_3))^3
     - smallest_angle, largest_angle: between neighbouring edges, in degrees; the largest is taken from 360 where the
       quadrilateral is not convex
@@ -89,10 +89,10 @@ def hexahedron_corner_measures(corners: Floats) -> Measures:
 
     - scaled_jacobian: least determinant of three unit vectors, along the edges that leave a corner, of all eight
       corners, or along the principal axes
-    - aspect_ratio: largest \\|X_i\\| / \\|X_j\\|, Verdict's maximum edge ratio, which CUBIT calls the aspect ratio; of
+    - aspect_ratio: largest |X_i| / |X_j|, Verdict's maximum edge ratio, which CUBIT calls the aspect ratio; of
       Verdict's quadrilateral aspect ratio there is no counterpart
     - edge_ratio: longest over shortest edge, the aspect ratio of ANSYS and Abaqus
-    - skew: largest \\|cos(X_i, X_j)\\|
+    - skew: largest |cos(X_i, X_j)|
     - warpage, smallest_angle, largest_angle: the worst of the faces'
 
     Parameters

@@ -19,7 +19,16 @@ from gyroid_cad.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.corner_measures import hexahedron_corner_measures, quadrilateral_corner_measures
 from gyroid_cad.mesh.determinants import HEXAHEDRA, determinant_measures, sampled_determinants
-from gyroid_cad.mesh.summaries import USUAL_BOUNDS, MeasureSummary, Quality, combined, quality_rows, summary_of
+from gyroid_cad.mesh.summaries import (
+    USUAL_BOUNDS,
+    MeasureSummary,
+    Quality,
+    combined,
+    quality_rows,
+    shown_name,
+    shown_number,
+    summary_of,
+)
 
 __all__ = [
     "USUAL_BOUNDS",
@@ -31,6 +40,8 @@ __all__ = [
     "inverted",
     "quality_report",
     "quality_rows",
+    "shown_name",
+    "shown_number",
 ]
 
 Floats = NDArray[np.float64]
@@ -40,7 +51,7 @@ Measures = dict[str, Floats]
 _QUADRILATERAL = 4
 _CORNERS = 8
 # So few that what is computed for them stays in the processor's cache.
-_ELEMENTS_AT_ONCE = 2048
+_NODES_AT_ONCE = 16_384
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,8 +176,9 @@ def _described(array: NDArray[Any]) -> str:
 
 def _blocks(points: Floats, cells: Integers) -> Iterator[tuple[int, Floats]]:
     """Index of the first element and coordinates (3, nodes, elements) of some elements at a time."""
-    for first in range(0, len(cells), _ELEMENTS_AT_ONCE):
-        yield first, np.ascontiguousarray(points[cells[first : first + _ELEMENTS_AT_ONCE].T].transpose(2, 0, 1))
+    step = _NODES_AT_ONCE // cells.shape[1]
+    for first in range(0, len(cells), step):
+        yield first, np.ascontiguousarray(points[cells[first : first + step].T].transpose(2, 0, 1))
 
 
 def _measures(nodes: Floats) -> Measures:

@@ -15,7 +15,16 @@ from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.corner_measures import NO_NUMBER
 
-__all__ = ["USUAL_BOUNDS", "MeasureSummary", "Quality", "combined", "quality_rows", "summary_of"]
+__all__ = [
+    "USUAL_BOUNDS",
+    "MeasureSummary",
+    "Quality",
+    "combined",
+    "quality_rows",
+    "shown_name",
+    "shown_number",
+    "summary_of",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -39,15 +48,15 @@ class _Kind:
 # The bounds are those of CUBIT's manual (hexahedral and quadrilateral metrics); of the ratio of determinants that at
 # which ANSYS warns of its inverse (SHPP, Jacobian ratio of h-elements: 30).
 _KINDS = {
-    "scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 80),
-    "aspect_ratio": _Kind(False, 4.0, 1.0, 11.0, 100),
-    "edge_ratio": _Kind(False, 4.0, 1.0, 11.0, 100),
-    "skew": _Kind(False, 0.5, 0.0, 1.0, 50),
-    "warpage": _Kind(False, 0.1, 0.0, 2.0, 100),
+    "scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 200),
+    "aspect_ratio": _Kind(False, 4.0, 1.0, 11.0, 200),
+    "edge_ratio": _Kind(False, 4.0, 1.0, 11.0, 200),
+    "skew": _Kind(False, 0.5, 0.0, 1.0, 100),
+    "warpage": _Kind(False, 0.1, 0.0, 2.0, 400),
     "smallest_angle": _Kind(True, 45.0, 0.0, 90.0, 90),
     "largest_angle": _Kind(False, 135.0, 90.0, 360.0, 135),
-    "determinant_ratio": _Kind(True, 1 / 30, -1.0, 1.0, 80),
-    "sampled_scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 80),
+    "determinant_ratio": _Kind(True, 1 / 30, -1.0, 1.0, 200),
+    "sampled_scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 200),
 }
 USUAL_BOUNDS: Mapping[str, float] = MappingProxyType({name: kind.bound for name, kind in _KINDS.items()})
 
@@ -142,6 +151,16 @@ def combined(qualities: Iterable[Quality]) -> Quality:
     return reduce(_both, qualities)
 
 
+def shown_name(name: str) -> str:
+    """A measure's name as people read it."""
+    return name.replace("_", " ").replace("jacobian", "Jacobian")
+
+
+def shown_number(number: float) -> str:
+    """A measure as people read it."""
+    return "none" if number >= NO_NUMBER else f"{number:.4g}"
+
+
 def quality_rows(quality: Quality) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows of a table: a line for each measure."""
     header = ("measure", "smallest", "mean", "largest", "deviation", "beyond bound", "worst at (mm)")
@@ -151,8 +170,8 @@ def quality_rows(quality: Quality) -> tuple[tuple[str, ...], list[tuple[str, ...
         side = "<" if _KINDS[name].larger_is_better else ">"
         rows.append(
             (
-                name.replace("_", " "),
-                *(f"{number:.4g}" for number in numbers),
+                shown_name(name),
+                *map(shown_number, numbers),
                 f"{summary.beyond} {side} {summary.bound:.3g}",
                 ", ".join(f"{coordinate + 0.0:.4g}" for coordinate in np.round(summary.worst_place, 6).tolist()),
             )

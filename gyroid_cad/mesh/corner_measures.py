@@ -40,7 +40,7 @@ _NOTHING = 10 * np.finfo(float).eps
 
 
 def quadrilateral_corner_measures(corners: Floats) -> Measures:
-    """Verdict's measures of quadrilaterals in space (SAND2007-1751, ch. 5).
+    """Verdict's measures of quadrilaterals in space (SAND2007-1751, quadrilateral quality metrics).
 
     With edges e_k from corner k to corner k + 1, corner normals N_k = e_(k-1) x e_k, principal axes
     X_1 = e_0 - e_2, X_2 = e_1 - e_3 and n their unit normal:
@@ -83,7 +83,7 @@ def quadrilateral_corner_measures(corners: Floats) -> Measures:
 
 
 def hexahedron_corner_measures(corners: Floats) -> Measures:
-    """Verdict's measures of hexahedra (SAND2007-1751, ch. 7), and the worst of their six faces'.
+    """Verdict's measures of hexahedra (SAND2007-1751, hexahedral quality metrics), and the worst of their faces'.
 
     X_1, X_2, X_3 are the principal axes, each the sum of the four edges along it.
 
@@ -91,7 +91,7 @@ def hexahedron_corner_measures(corners: Floats) -> Measures:
       corners, or along the principal axes
     - aspect_ratio: largest |X_i| / |X_j|, Verdict's maximum edge ratio, which CUBIT calls the aspect ratio; of
       Verdict's quadrilateral aspect ratio there is no counterpart
-    - edge_ratio: longest over shortest edge, the aspect ratio of ANSYS and Abaqus
+    - edge_ratio: longest over shortest edge, which Abaqus/CAE calls the aspect ratio
     - skew: largest |cos(X_i, X_j)|
     - warpage, smallest_angle, largest_angle: the worst of the faces'
 

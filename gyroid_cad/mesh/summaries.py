@@ -45,8 +45,8 @@ class _Kind:
         return np.linspace(self.lowest, self.highest, self.bins + 1)
 
 
-# The bounds are those of CUBIT's manual (hexahedral and quadrilateral metrics); of the ratio of determinants that at
-# which ANSYS warns of its inverse (SHPP, Jacobian ratio of h-elements: 30).
+# The bounds are those of CUBIT's manual (hexahedral and quadrilateral metrics), whose warpage is 1 less ours; that of
+# the ratio of determinants, which it does not have, is ours.
 _KINDS = {
     "scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 200),
     "aspect_ratio": _Kind(False, 4.0, 1.0, 11.0, 200),
@@ -55,7 +55,7 @@ _KINDS = {
     "warpage": _Kind(False, 0.1, 0.0, 2.0, 400),
     "smallest_angle": _Kind(True, 45.0, 0.0, 90.0, 90),
     "largest_angle": _Kind(False, 135.0, 90.0, 360.0, 135),
-    "determinant_ratio": _Kind(True, 1 / 30, -1.0, 1.0, 200),
+    "determinant_ratio": _Kind(True, 0.3, -1.0, 1.0, 200),
     "sampled_scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 200),
 }
 USUAL_BOUNDS: Mapping[str, float] = MappingProxyType({name: kind.bound for name, kind in _KINDS.items()})

@@ -177,6 +177,12 @@ def test_crossed_and_straight_quadrilaterals_agree_with_vtk(corners: Floats) -> 
     assert_agrees_on_quadrilaterals(corners[np.newaxis].astype(float))
 
 
+def test_a_straight_angle_is_180_degrees_here_and_less_in_vtk() -> None:
+    corners = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0.5, 0], [0, 1, 0]]])
+    assert measures_of(corners)["largest_angle"] == pytest.approx(180, abs=1e-12)
+    assert 1e-7 < 180 - vtk_quadrilaterals(corners)["largest_angle"] < 1e-5
+
+
 @pytest.mark.parametrize("edge", range(4))
 def test_a_quadrilateral_with_an_edge_of_no_length_is_among_the_worst_whichever_edge_it_is(edge: int) -> None:
     corners = SQUARE.copy()

@@ -82,9 +82,9 @@ def mesh_command(
         pairs = lattice.periodic_pairs(made) if made.layers else None
         measured = None
         if quality or histogram:
-            from gyroid_cad.mesh.quality import quality_report
+            from gyroid_cad.meshing import mesh_quality
 
-            measured = quality_report(made.points, made.cells)
+            measured = mesh_quality(made)
         for target in targets:
             write_mesh(made, target, pairs, progress)
         if measured is not None and histogram is not None:

@@ -305,7 +305,7 @@ class Lattice:
         Returns
         -------
         Mesh
-            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.quality_report`.
+            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.mesh_quality`.
 
         Raises
         ------

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.laying import LaidWall
 from gyroid_cad.mesh.hexahedra import Mesh, hexahedra, quadrilaterals
+from gyroid_cad.mesh.quality import Quality, inverted, quality_report
 
-__all__ = ["hexahedral_mesh", "quadrilateral_mesh"]
+__all__ = ["hexahedral_mesh", "mesh_quality", "quadrilateral_mesh"]
+
+_QUADRILATERAL_CORNERS = 4
 
 
 def hexahedral_mesh(laid: LaidWall, subdivisions: int, layers: int, order: int, full: bool) -> Mesh:
@@ -18,7 +23,23 @@ def hexahedral_mesh(laid: LaidWall, subdivisions: int, layers: int, order: int, 
         If the lattice is trimmed, or an element would be turned inside out: then it says where.
     """
     _require_whole_patches(laid)
-    return hexahedra(laid.wall, subdivisions, layers, order, full)
+    mesh = hexahedra(laid.wall, subdivisions, layers, order, full)
+    # Of patches that are alike one is looked at.
+    patches = np.unique(laid.wall.patch_net, return_index=True)[1]
+    elements = mesh.cells.reshape(laid.complex.patch_count, -1, mesh.cells.shape[1])[patches].reshape(
+        -1, mesh.cells.shape[1]
+    )
+    bad = inverted(mesh.points, elements)
+    if len(bad.elements):
+        worst = int(np.argmin(bad.determinants))
+        where = ", ".join(f"{x:.4g}" for x in bad.places[worst])
+        raise ParameterError(
+            "thickness",
+            laid.thickest,
+            f"a thinner wall, or more than {subdivisions} subdivisions: near ({where}) mm an element of the mesh is "
+            f"turned inside out, and {len(bad.elements) - 1} others of {len(elements)}",
+        )
+    return mesh
 
 
 def quadrilateral_mesh(laid: LaidWall, subdivisions: int, order: int, full: bool) -> Mesh:
@@ -31,6 +52,20 @@ def quadrilateral_mesh(laid: LaidWall, subdivisions: int, order: int, full: bool
     """
     _require_whole_patches(laid)
     return quadrilaterals(laid.wall, subdivisions, order, full)
+
+
+def mesh_quality(mesh: Mesh) -> Quality:
+    """What the elements of a mesh are worth; of quadrilaterals the corners are measured.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    Quality
+    """
+    return quality_report(mesh.points, mesh.cells if mesh.layers else mesh.cells[:, :_QUADRILATERAL_CORNERS])
 
 
 def _require_whole_patches(laid: LaidWall) -> None:

@@ -73,6 +73,10 @@ def mesh_command(
     targets = [require_mesh_format(path, full) for path in output]
     if len({target.resolve() for target in targets}) < len(targets):
         raise ParameterError("output", list(output), "each file once")
+    if histogram is not None:
+        from gyroid_cad.mesh.quality_picture import draw_quality, require_histogram
+
+        require_histogram(histogram)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         made = (
             lattice.quadrilaterals(subdivisions, order, full)
@@ -88,8 +92,6 @@ def mesh_command(
         for target in targets:
             write_mesh(made, target, pairs, progress)
         if measured is not None and histogram is not None:
-            from gyroid_cad.mesh.quality_picture import draw_quality
-
             draw_quality(measured, histogram)
     files = [*output, *([histogram] if histogram else [])]
     summary = {

@@ -16,13 +16,31 @@ from gyroid_cad.mesh.summaries import MeasureSummary, Quality, shown_name
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_quality"]
+__all__ = ["draw_quality", "require_histogram"]
 
 _FORMAT = ".png"
 _COLUMNS = 4
 # In inches, of each histogram; and how fine.
 _WIDTH, _HEIGHT, _DOTS_PER_INCH = 3.1, 2.3, 110
 _BAR_COLOUR, _BOUND_COLOUR = "#deae52", "#a03020"
+
+
+def require_histogram(path: str | os.PathLike[str]) -> Path:
+    """Check, before anything is meshed, that a picture of histograms can be drawn into a file.
+
+    Raises
+    ------
+    ParameterError
+        If the path does not end in .png or cannot be written to, or matplotlib is missing.
+    """
+    target = require_writable(path)
+    if target.suffix.lower() != _FORMAT:
+        raise ParameterError("histogram", str(path), f"a file name ending in {_FORMAT}")
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError:
+        raise ParameterError("histogram", str(path), "none without matplotlib: pip install matplotlib") from None
+    return target
 
 
 def draw_quality(quality: Quality, path: str | os.PathLike[str], title: str = "") -> Path:
@@ -49,13 +67,9 @@ def draw_quality(quality: Quality, path: str | os.PathLike[str], title: str = ""
     ExportError
         If the file could not be written.
     """
-    target = require_writable(path)
-    if target.suffix.lower() != _FORMAT:
-        raise ParameterError("picture", str(path), f"a file name ending in {_FORMAT}")
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ParameterError("picture", str(path), "none without matplotlib: pip install matplotlib") from None
+    target = require_histogram(path)
+    from matplotlib.figure import Figure
+
     rows = ceil(len(quality.measures) / _COLUMNS)
     figure = Figure(figsize=(_COLUMNS * _WIDTH, rows * _HEIGHT + 0.4), dpi=_DOTS_PER_INCH, layout="constrained")
     figure.suptitle(title or _subject(quality))

@@ -98,12 +98,12 @@ def seconds_of_process(*arguments: str) -> float:
     return perf_counter() - start
 
 
-def fresh_python(*arguments: str) -> str:
-    """Run this Python anew, with the project importable, and give back what it printed."""
+def fresh_python(*arguments: str, **environment: str) -> str:
+    """Run this Python anew, with the project importable and these variables set, and give back what it printed."""
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     process = subprocess.run(
         [sys.executable, *arguments],
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, **environment},
         capture_output=True,
         text=True,
         check=False,

@@ -203,7 +203,7 @@ def _meshed(wall: Wall, subdivisions: int, layers: int, element: ElementType) ->
     steps = element.order * subdivisions
     across = np.linspace(0, 1, element.order * layers + 1) if layers else np.array([0.5])
     points = _nodes(wall, steps, across)
-    cells = _cells(patch_places(wall.complex, steps) * len(across), element, max(layers, 1))
+    cells = _cells(patch_places(wall.complex, steps), len(across), element)
     kept = None
     if element.sparse:
         kept, numbers = np.unique(cells, return_inverse=True)
@@ -241,7 +241,9 @@ def _nodes(wall: Wall, steps: int, levels: Floats) -> Floats:
         nets = wall.patch_net[some]
         within, around = _split_grids(wall, nets, steps, levels) if known is None else (part[nets] for part in known)
         shifts = wall.shifts[wall.patch_shift[some]][:, np.newaxis, np.newaxis]
-        np.add(within, shifts, out=inside[some])
+        # Axis by axis: loops of three would be too short.
+        for axis in range(3):
+            np.add(within[..., axis], shifts[..., axis], out=inside[some][..., axis])
         points[patch_places(wall.complex, steps, some).reshape(len(nets), -1)[:, border]] = around + shifts
     return points.reshape(-1, 3)
 
@@ -268,16 +270,19 @@ def _grids(wall: Wall, nets: Integers | slice, steps: int, levels: Floats) -> Fl
     return np.asarray(below + levels[:, np.newaxis] * (above - below))
 
 
-def _cells(numbers: Integers, element: ElementType, layers: int) -> Integers:
-    """Elements on grids of numbers (patches, steps + 1, steps + 1) that count levels in ones."""
-    order = element.order
-    side = numbers.shape[1]
+def _cells(places: Integers, levels: int, element: ElementType) -> Integers:
+    """Elements on grids of places (patches, steps + 1, steps + 1), each of which has a node at every level."""
+    order, side = element.order, places.shape[1]
     u, v, w = (element.nodes * order // 2).T
-    first = np.arange(0, side - 1, order)
-    places = (first[:, np.newaxis, np.newaxis] + u) * side + first[:, np.newaxis] + v
-    rows = numbers.reshape(len(numbers), -1).take(places.ravel(), axis=1).reshape(len(numbers), 1, -1, len(w))
-    levels = order * np.arange(layers)[:, np.newaxis, np.newaxis] + w
-    return np.asarray((rows + levels).reshape(-1, len(w)))
+    across, along = np.arange(0, max(levels - 1, 1), order), np.arange(0, side - 1, order)
+    # Of a patch's own nodes, in rows along v, u and the layers: the same for every patch.
+    of_patch = (
+        ((along[:, np.newaxis, np.newaxis] + u) * side + along[:, np.newaxis] + v) * levels
+        + across[:, np.newaxis, np.newaxis, np.newaxis]
+        + w
+    )
+    nodes = (places[..., np.newaxis] * levels + np.arange(levels)).reshape(len(places), -1)
+    return np.asarray(nodes.take(of_patch.ravel(), axis=1).reshape(-1, len(w)))
 
 
 def _surface(parts: list[tuple[Integers, int]]) -> Surface:

@@ -1,0 +1,91 @@
+"""The paper's mesh, 4 x 3 x 2 cells at 20 x 20 a patch: what it takes beside its bare nodes, and how good it is.
+
+The bare nodes are those of every patch by one matrix product: tensor products of basis functions, one row a node, times
+the control points of both faces of all patches, shared nodes over and over. Ours makes each node once, and the
+elements. Both in a process with one thread, for ours needs no more, by processor time; writing beside it.
+
+Run: ``python -m benchmarks.meshes``
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.subject import CELL_SIZE
+from benchmarks.timing import Row, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
+from gyroid_cad.lattice import Lattice
+from gyroid_cad.mesh.hexahedra import hexahedra, quadrilaterals
+from gyroid_cad.mesh.mesh_files import MESH_FORMATS, write_mesh
+from gyroid_cad.meshing import mesh_quality
+from gyroid_cad.nurbs import basis
+
+__all__ = ["main"]
+
+_CELLS, _SUBDIVISIONS = (4, 3, 2), 20
+_ELEMENTS = 230_400
+_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+def main(arguments: Sequence[str] = ()) -> bool:
+    """Print the tables; returns whether every requirement is met."""
+    seconds = json.loads(fresh_python("-m", "benchmarks.meshes", "--alone", **_THREAD))
+    lattice = Lattice(_CELLS, CELL_SIZE, 0.1 * CELL_SIZE)
+    quality = mesh_quality(lattice.hexahedra(_SUBDIVISIONS, 3))
+    scaled = quality.measures["scaled_jacobian"]
+    counts = len(lattice.quadrilaterals(_SUBDIVISIONS).cells), len(lattice.hexahedra(_SUBDIVISIONS).cells)
+    rows = [
+        Row("quadrilaterals off the paper's number", abs(counts[0] - _ELEMENTS), 0),
+        Row("hexahedra off the paper's number", abs(counts[1] - _ELEMENTS), 0),
+        Row("hexahedra / nodes by one product", seconds["hexahedra"] / seconds["product"], 5, 2, "x"),
+        Row("  and looked at for being inside out", seconds["checked"] / seconds["product"], unit="x"),
+        Row("quadrilaterals / nodes of both faces by one product", seconds["quads"] / seconds["product"], unit="x"),
+        Row("3 layers at 0.1 L: smallest scaled Jacobian", scaled.smallest, 0.5, at_least=True),
+        Row("  mean", scaled.mean, 0.9, at_least=True),
+        Row("  turned inside out", quality.inverted, 0),
+    ]
+    passed = print_verdicts("The paper's mesh", rows)
+    _print_writing(lattice)
+    return passed
+
+
+def _print_writing(lattice: Lattice) -> None:
+    mesh = lattice.hexahedra(_SUBDIVISIONS)
+    lines = []
+    with TemporaryDirectory() as folder:
+        for ending in MESH_FORMATS:
+            path = Path(folder) / f"mesh{ending}"
+            seconds, _ = best_of(lambda path=path: write_mesh(mesh, path), 1)  # type: ignore[misc]
+            lines.append((ending, f"{seconds:.2f} s", f"{path.stat().st_size / 1e6:.1f} MB"))
+    plain_table("230,400 hexahedra to files", ("", "processor time", "size"), lines)
+
+
+def _run_alone() -> None:
+    lattice = Lattice(_CELLS, CELL_SIZE, 0.1 * CELL_SIZE)
+    wall = lattice.laid().wall
+    along = basis(wall.knots, 3, np.linspace(-1, 1, _SUBDIVISIONS + 1))
+    functions = np.kron(along, along)
+    nets = wall.nets[wall.patch_net] + wall.shifts[wall.patch_shift][:, np.newaxis, np.newaxis, np.newaxis]
+    control_points = np.ascontiguousarray(nets.reshape(-1, functions.shape[1], 3).swapaxes(0, 1))
+    control_points = control_points.reshape(functions.shape[1], -1)
+    product, ours, quads, checked = best_in_turn(
+        20,
+        lambda: functions @ control_points,
+        lambda: hexahedra(wall, _SUBDIVISIONS),
+        lambda: quadrilaterals(wall, _SUBDIVISIONS),
+        lambda: lattice.hexahedra(_SUBDIVISIONS),
+    )
+    names = ("product", "hexahedra", "quads", "checked")
+    print(json.dumps({name: some[0] for name, some in zip(names, (product, ours, quads, checked), strict=True)}))
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--alone"]:
+        _run_alone()
+    else:
+        sys.exit(not main(sys.argv[1:]))

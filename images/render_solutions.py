@@ -22,7 +22,7 @@ from gyroid_cad.nurbs_volume import NurbsVolume
 Floats = NDArray[np.float64]
 Colours = tuple[tuple[float, float, float], ...]
 
-_SIZE = (1600, 700)
+_SIZE = (1400, 612)
 _CAMERA = (3, -4, 1.9)
 # From the middle of one lattice to the other's, in cells.
 _APART = 3.55

@@ -167,10 +167,17 @@ def periodic_points(wall: Wall, volumes: VolumePatches) -> Integers:
     -------
     ndarray of int, shape (points,)
         For each control point its number in the endless lattice, from 0.
+
+    Raises
+    ------
+    ParameterError
+        If the wall is no block of whole cells.
     """
     complex = wall.complex
     endless = build_complex(complex.cells, complex.placements, closed=(True, True, True))
-    steps = len(wall.knots) - 5
+    if not np.array_equal(complex.patch_cell, endless.patch_cell):
+        raise ParameterError("wall", f"{complex.patch_count} patches", "a block of whole cells")
+    steps = len(wall.weights) - 1
     levels = np.arange(volumes.weights.shape[2]) * place_count(endless, steps)
     numbers = np.empty(len(volumes.control_points), dtype=np.int64)
     numbers[volumes.patch_points] = patch_places(endless, steps)[..., np.newaxis] + levels

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from volume_cases import CELL_SIZE, KINDS, constant_wall, turned_placements, wall_named
 
-from gyroid_cad import ParameterError
+from gyroid_cad import FitSettings, Lattice, ParameterError
 from gyroid_cad.complex import build_complex
 from gyroid_cad.mesh.places import place_count
 from gyroid_cad.mesh.volumes import (
@@ -179,6 +179,12 @@ def test_in_the_endless_lattice_equal_numbers_are_whole_blocks_apart(
     apart = (volumes.control_points - first[numbers]) / (CELL_SIZE * np.array(cells))
     np.testing.assert_allclose(apart, np.rint(apart), atol=1e-11)
     assert np.any(np.rint(apart))
+
+
+def test_a_wall_that_reaches_beyond_its_cells_has_no_ends_to_join() -> None:
+    wall = Lattice((1, 1, 1), CELL_SIZE, 0.8, fit=FitSettings(5), trim="box").wall()
+    with pytest.raises(ParameterError, match=r"wall = .* patches.*: expected a block of whole cells"):
+        periodic_points(wall, wall_volumes(wall))
 
 
 @pytest.mark.parametrize("degree", [0, 2, 4, -1, True, 1.0, "3", None])

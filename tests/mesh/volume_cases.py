@@ -9,10 +9,12 @@ import numpy as np
 
 from gyroid_cad import Cylinder, FitSettings, Lattice, fit_patch, linear
 from gyroid_cad.complex import build_complex
+from gyroid_cad.mesh.volumes import VolumePatches, wall_volumes
 from gyroid_cad.symmetry import Placements, bounding_cell, cubic_cell
 from gyroid_cad.wall import Wall, build_wall
 
 CELL_SIZE = 10.0
+KINDS = ("uniform", "turned", "rational", "graded", "mapped", "ring")
 # The fourfold rotoinversion about the patch's centre, (x, y, z) -> (y, -x, -z), which carries the patch onto itself.
 TURN = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, -1]])
 
@@ -58,4 +60,6 @@ def wall_named(name: str) -> Wall:
     return makers[name]()
 
 
-KINDS = ("uniform", "turned", "rational", "graded", "mapped", "ring")
+@lru_cache
+def volumes_named(kind: str, degree: int = 1) -> VolumePatches:
+    return wall_volumes(wall_named(kind), degree)

@@ -115,7 +115,11 @@ def write_mfem_field(volumes: VolumePatches, values: ArrayLike, path: str | os.P
 
 
 def _write_mfem(volumes: VolumePatches, path: Path) -> None:
-    """Homogeneous control points, as every release since the format's first reads them."""
+    """Control points are homogeneous: (weight x, weight y, weight z, weight).
+
+    An edge's knot vector runs from its first vertex to its second. Opposite edges of a patch must name the same one,
+    run the same way: MFEM before 4.10 reads nothing else (``NURBSExtension::CheckPatches``).
+    """
     faces = volumes.patch_vertices[volumes.boundary[:, 0, np.newaxis], FACE_CORNERS[volumes.boundary[:, 1]]]
     shapes = [np.full(len(rows), shape) for rows, shape in ((volumes.patch_vertices, _CUBE), (faces, _SQUARE))]
     named = ", ".join(f"{number} {name}" for number, name in enumerate(BOUNDARY_PARTS, start=1))

@@ -34,6 +34,28 @@ def test_mfem_joins_the_patches_at_all_control_points_they_share(kind: str, degr
     np.testing.assert_allclose(problem.nodes, volumes.control_points[numbers], atol=1e-13 * CELL_SIZE)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_opposite_edges_have_one_knot_vector_the_same_way_round_in_mfems_file(kind: str, tmp_path: Path) -> None:
+    # MFEM 4.10 would turn them itself; older releases read no other file.
+    write_volumes(volumes_named(kind), tmp_path / "wall.mesh")
+    lines = (tmp_path / "wall.mesh").read_text().split("\n")
+
+    def section(name: str) -> list[list[int]]:
+        first = lines.index(name) + 2
+        return [list(map(int, line.split())) for line in lines[first : first + int(lines[first - 1])]]
+
+    knots = {(start, end): (knot, 1) for knot, start, end in section("edges")}
+    knots |= {(end, start): (knot, -1) for (start, end), (knot, _) in knots.items()}
+    for _, _, *corners in section("elements"):
+        a, b, c, d, e, f, g, h = corners
+        for along in (
+            [(a, b), (d, c), (e, f), (h, g)],
+            [(a, d), (b, c), (e, h), (f, g)],
+            [(a, e), (b, f), (c, g), (d, h)],
+        ):
+            assert len({knots[ends] for ends in along}) == 1
+
+
 @pytest.mark.parametrize("degree", [1, 3])
 @pytest.mark.parametrize("kind", ["uniform", "turned", "graded", "mapped"])
 def test_mfem_integrates_the_volume_of_the_wall(kind: str, degree: int, tmp_path: Path) -> None:

@@ -5,13 +5,13 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import spsolve
 
-from gyroid_cad import Lattice
-from gyroid_cad.mesh.volume_files import write_mfem_field, write_volumes
-from gyroid_cad.mesh.volumes import periodic_points, wall_volumes
+from gyroid_cad import Lattice, write_volumes
+from gyroid_cad.mesh.volume_files import write_mfem_field
+from gyroid_cad.mesh.volumes import periodic_points
 
 lattice = Lattice(cells=(1, 1, 1), cell_size=10, density=0.3)
 wall = lattice.wall()
-volumes = wall_volumes(wall, degree=3)
+volumes = lattice.volumes(degree=3)
 mesh_file, numbers_file = "isogeometric_heat.mesh", "control_point_numbers.gf"
 write_volumes(volumes, mesh_file)
 write_volumes(volumes, "isogeometric_heat.npz")

@@ -9,9 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from gyroid_cad import Lattice
-from gyroid_cad.mesh.abaqus import write_periodic_equations
-from gyroid_cad.mesh.mesh_files import write_mesh
+from gyroid_cad import Lattice, write_mesh, write_periodic_equations
 
 CELL_SIZE, DENSITY = 10.0, 0.3
 YOUNG, POISSON = 1000.0, 0.3  # MPa
@@ -46,7 +44,7 @@ def stiffness(subdivisions: int, job: Path) -> float:
     lattice = Lattice((1, 1, 1), CELL_SIZE, density=DENSITY)
     mesh = lattice.hexahedra(subdivisions, order=2)
     pairs = lattice.periodic_pairs(mesh)
-    write_mesh(mesh, job.with_name("mesh.inp"), pairs)
+    write_mesh(mesh, job.with_name("mesh").with_suffix(".inp"), pairs)
     reference = len(mesh.points) + 1
     with job.with_suffix(".inp").open("w") as file:
         before, after = JOB.split("{equations}")

@@ -30,6 +30,12 @@ if TYPE_CHECKING:
     from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.maps import SpaceMap
+    from gyroid_cad.mesh.abaqus import write_periodic_equations
+    from gyroid_cad.mesh.hexahedra import Mesh
+    from gyroid_cad.mesh.mesh_files import write_mesh
+    from gyroid_cad.mesh.volume_files import write_volumes
+    from gyroid_cad.mesh.volumes import VolumePatches
+    from gyroid_cad.meshing import mesh_quality
     from gyroid_cad.nurbs import NurbsSurface
 
 __all__ = [
@@ -46,12 +52,14 @@ __all__ = [
     "KernelError",
     "Lattice",
     "LatticeReport",
+    "Mesh",
     "NurbsSurface",
     "ParameterError",
     "SoundnessError",
     "SpaceMap",
     "Sphere",
     "Twist",
+    "VolumePatches",
     "__version__",
     "between_planes",
     "constant",
@@ -62,10 +70,14 @@ __all__ = [
     "fit_patch",
     "fit_report",
     "linear",
+    "mesh_quality",
     "radial",
     "sampled",
     "smooth_maximum",
     "smooth_minimum",
+    "write_mesh",
+    "write_periodic_equations",
+    "write_volumes",
 ]
 
 _HOMES = {
@@ -88,6 +100,12 @@ _HOMES = {
     "fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
     "maps": ("SpaceMap",),
+    "mesh.abaqus": ("write_periodic_equations",),
+    "mesh.hexahedra": ("Mesh",),
+    "mesh.mesh_files": ("write_mesh",),
+    "mesh.volume_files": ("write_volumes",),
+    "mesh.volumes": ("VolumePatches",),
+    "meshing": ("mesh_quality",),
     "nurbs": ("NurbsSurface",),
 }
 

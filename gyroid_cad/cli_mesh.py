@@ -1,10 +1,11 @@
-"""``gyroid-cad mesh``: a lattice as structured elements, with what they are worth."""
+"""``gyroid-cad mesh`` and ``volumes``: a lattice for analysis, as structured elements or as trivariate patches."""
 
 from __future__ import annotations
 
 import json
 import sys
 import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ import click
 
 from gyroid_cad.cli_lattice import lattice_of, lattice_options
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.tables import print_mesh, print_table, shown_progress
+from gyroid_cad.tables import print_mesh, print_table, print_volumes, shown_progress
 
-__all__ = ["mesh_command"]
+__all__ = ["mesh_command", "volumes_command"]
 
 
 @click.command("mesh")
@@ -65,14 +66,10 @@ def mesh_command(
     start = time.perf_counter()
     from gyroid_cad.mesh.mesh_files import require_mesh_format, write_mesh
 
-    if not output:
-        raise click.UsageError("Missing option '-o' / '--output'.")
     if subdivisions is None:
         raise click.UsageError("Missing option '--subdivisions'.")
     lattice = lattice_of(given)
-    targets = [require_mesh_format(path, full) for path in output]
-    if len({target.resolve() for target in targets}) < len(targets):
-        raise ParameterError("output", list(output), "each file once")
+    targets = _distinct(output, lambda path: require_mesh_format(path, full))
     if histogram is not None:
         from gyroid_cad.mesh.quality_picture import draw_quality, require_histogram
 
@@ -104,7 +101,7 @@ def mesh_command(
         "sets": {name: len(some) for name, some in {**made.node_sets(), **made.element_sets()}.items()},
         "periodic_pairs": 0 if pairs is None else len(pairs),
         "quality": None if measured is None else measured.as_dict(),
-        "files": [{"path": path, "bytes": Path(path).stat().st_size} for path in files],
+        "files": _sizes(files),
         "seconds": time.perf_counter() - start,
     }
     if as_json:
@@ -115,3 +112,59 @@ def mesh_command(
             from gyroid_cad.mesh.summaries import quality_rows
 
             print_table(*quality_rows(measured))
+
+
+@click.command("volumes")
+@click.option(
+    "-o",
+    "--output",
+    multiple=True,
+    metavar="FILE",
+    help=".mesh (MFEM NURBS mesh v1.0), .xml (G+Smo multipatch), .json or .npz; may be repeated.",
+)
+@lattice_options
+@click.option("--degree", type=int, default=1, show_default=True, metavar="1|3", help="Across the wall; 3 along it.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+@click.option("--quiet", is_flag=True, help="Print no table.")
+def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: bool, **given: Any) -> None:
+    """Write a lattice as conforming trivariate NURBS patches, for isogeometric analysis.
+
+    The lattice is described as for "build", by options or in a TOML file.
+
+    \b
+    gyroid-cad volumes -o cell.mesh -o cell.xml --cells 1 1 1 --cell-size 10 --density 0.3 --degree 3
+    """
+    start = time.perf_counter()
+    from gyroid_cad.mesh.volume_files import require_volume_file, write_volumes
+
+    lattice = lattice_of(given)
+    targets = _distinct(output, require_volume_file)
+    made = lattice.volumes(degree)
+    for target in targets:
+        write_volumes(made, target)
+    summary = {
+        "patches": len(made),
+        "degrees": list(made.degrees),
+        "control_points": len(made.control_points),
+        "interfaces": len(made.interfaces),
+        "files": _sizes(output),
+        "seconds": time.perf_counter() - start,
+    }
+    if as_json:
+        click.echo(json.dumps(summary))
+    elif not quiet:
+        print_volumes(summary)
+
+
+def _distinct(output: tuple[str, ...], checked: Callable[[str], Path]) -> list[Path]:
+    """The files to write, each checked before anything is made."""
+    if not output:
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    targets = [checked(path) for path in output]
+    if len({target.resolve() for target in targets}) < len(targets):
+        raise ParameterError("output", list(output), "each file once")
+    return targets
+
+
+def _sizes(paths: Iterable[str]) -> list[dict[str, Any]]:
+    return [{"path": path, "bytes": Path(path).stat().st_size} for path in paths]

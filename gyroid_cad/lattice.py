@@ -32,7 +32,8 @@ from gyroid_cad.limits import (
 from gyroid_cad.maps import BlockMap
 from gyroid_cad.mesh.hexahedra import Mesh
 from gyroid_cad.mesh.periodic import PeriodicPairs, periodic_pairs
-from gyroid_cad.meshing import hexahedral_mesh, quadrilateral_mesh
+from gyroid_cad.mesh.volumes import VolumePatches
+from gyroid_cad.meshing import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
 from gyroid_cad.paper import paper_units
 from gyroid_cad.report import LatticeReport, report_of
 from gyroid_cad.stages import Progress
@@ -317,6 +318,25 @@ class Lattice:
     def quadrilaterals(self, subdivisions: int, order: int = 1, full: bool = False) -> Mesh:
         """The mid-surface as structured quadrilaterals, as of :meth:`hexahedra`; quadratic ones of 8 nodes, or of 9."""
         return quadrilateral_mesh(self.laid(), subdivisions, order, full)
+
+    def volumes(self, degree: int = 1) -> VolumePatches:
+        """The wall as trivariate NURBS patches that share their control points, for isogeometric analysis.
+
+        Parameters
+        ----------
+        degree : {1, 3}
+            Across the wall; 3 along it.
+
+        Returns
+        -------
+        VolumePatches
+            For :func:`gyroid_cad.write_volumes`.
+
+        Raises
+        ------
+        ParameterError
+        """
+        return lattice_volumes(self.laid(), degree)
 
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""

@@ -8,8 +8,9 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.laying import LaidWall
 from gyroid_cad.mesh.hexahedra import Mesh, hexahedra, quadrilaterals
 from gyroid_cad.mesh.quality import Quality, inverted, quality_report
+from gyroid_cad.mesh.volumes import VolumePatches, wall_volumes
 
-__all__ = ["hexahedral_mesh", "mesh_quality", "quadrilateral_mesh"]
+__all__ = ["hexahedral_mesh", "lattice_volumes", "mesh_quality", "quadrilateral_mesh"]
 
 _QUADRILATERAL_CORNERS = 4
 
@@ -52,6 +53,18 @@ def quadrilateral_mesh(laid: LaidWall, subdivisions: int, order: int, full: bool
     """
     _require_whole_patches(laid)
     return quadrilaterals(laid.wall, subdivisions, order, full)
+
+
+def lattice_volumes(laid: LaidWall, degree: int) -> VolumePatches:
+    """A lattice's wall as trivariate patches; see :func:`gyroid_cad.mesh.volumes.wall_volumes`.
+
+    Raises
+    ------
+    ParameterError
+        If the lattice is trimmed.
+    """
+    _require_whole_patches(laid)
+    return wall_volumes(laid.wall, degree)
 
 
 def mesh_quality(mesh: Mesh) -> Quality:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-__all__ = ["print_fill", "print_mesh", "print_summary", "print_table", "shown_progress"]
+__all__ = ["print_fill", "print_mesh", "print_summary", "print_table", "print_volumes", "shown_progress"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -84,6 +84,24 @@ def print_mesh(summary: dict[str, Any]) -> None:
         ("nodes", f"{summary['nodes']:,}"),
         ("patches", f"{summary['patches']:,}"),
         *([("periodic pairs", f"{summary['periodic_pairs']:,}")] if layers else []),
+        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
+        ("time", f"{summary['seconds']:.2f} s"),
+    ]
+    print_table(None, rows)
+
+
+def print_volumes(summary: dict[str, Any]) -> None:
+    """Print how many trivariate patches there are, their files and the time it took.
+
+    Parameters
+    ----------
+    summary : dict
+        With ``patches``, ``degrees``, ``control_points``, ``interfaces``, ``files`` and ``seconds``.
+    """
+    rows = [
+        ("patches", f"{summary['patches']:,} of degrees {', '.join(map(str, summary['degrees']))}"),
+        ("control points", f"{summary['control_points']:,}"),
+        ("interfaces", f"{summary['interfaces']:,}"),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
         ("time", f"{summary['seconds']:.2f} s"),
     ]

@@ -22,7 +22,7 @@ from gyroid_cad.nurbs_volume import NurbsVolume
 Floats = NDArray[np.float64]
 Colours = tuple[tuple[float, float, float], ...]
 
-_SIZE = (1400, 612)
+SIZE = (1400, 612)
 _CAMERA = (3, -4, 1.9)
 # From the middle of one lattice to the other's, in cells.
 _APART = 3.55
@@ -31,10 +31,10 @@ _HEIGHT = 3.4
 # Points along each side of a patch, and across the wall.
 _FINENESS, _FINENESS_ACROSS = 25, 4
 # The solved cell is repeated so often along each axis, as the solution is.
-_CELLS = 2
+CELLS = 2
 _COLD_TO_HOT: Colours = ((0.13, 0.29, 0.58), (0.93, 0.93, 0.88), (0.75, 0.16, 0.14))
-_LITTLE_TO_MUCH: Colours = ((0.20, 0.12, 0.30), (0.76, 0.29, 0.32), (0.99, 0.88, 0.60))
-_ISOTHERMS, _SHADES = 24, 256
+LITTLE_TO_MUCH: Colours = ((0.20, 0.12, 0.30), (0.76, 0.29, 0.32), (0.99, 0.88, 0.60))
+_ISOTHERMS, SHADES = 24, 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +59,9 @@ def main(folder: str) -> Path:
     right = np.cross((0, 0, 1), _CAMERA) / np.hypot(*_CAMERA[:2])
     renderer = vtk.vtkRenderer()
     renderer.SetBackground(1, 1, 1)
-    temperature = _table(_COLD_TO_HOT, (0, _CELLS), _ISOTHERMS)
-    flux = _table(_LITTLE_TO_MUCH, (0, max(float(face.flux.max()) for face in faces)), _SHADES)
-    for place in product(range(_CELLS), repeat=3):
+    temperature = lookup_table(_COLD_TO_HOT, (0, CELLS), _ISOTHERMS)
+    flux = lookup_table(LITTLE_TO_MUCH, (0, max(float(face.flux.max()) for face in faces)), SHADES)
+    for place in product(range(CELLS), repeat=3):
         moved = cell_size * np.array(place, dtype=float)
         for values, table, side in (("temperature", temperature, -0.5), ("flux", flux, 0.5)):
             rise = place[2] if values == "temperature" else 0
@@ -69,10 +69,10 @@ def main(folder: str) -> Path:
                 actor.SetPosition(*(moved + side * _APART * cell_size * right).tolist())
                 renderer.AddActor(actor)
     for table, title, left in ((temperature, "K", 0.015), (flux, "K per cell", 0.945)):
-        renderer.AddViewProp(_legend(table, title, left))
-    _place_camera(renderer, cell_size)
+        renderer.AddViewProp(legend(table, title, left))
+    place_camera(renderer, cell_size)
     target = FOLDER / "isogeometric_heat.png"
-    write_picture(renderer, _SIZE, target)
+    write_picture(renderer, SIZE, target)
     return target
 
 
@@ -167,7 +167,7 @@ def _mapper(data: vtk.vtkPolyData) -> vtk.vtkPolyDataMapper:
     return mapper
 
 
-def _table(colours: Colours, limits: tuple[float, float], count: int) -> vtk.vtkLookupTable:
+def lookup_table(colours: Colours, limits: tuple[float, float], count: int) -> vtk.vtkLookupTable:
     table = vtk.vtkLookupTable()
     table.SetNumberOfTableValues(count)
     table.SetRange(*limits)
@@ -177,13 +177,13 @@ def _table(colours: Colours, limits: tuple[float, float], count: int) -> vtk.vtk
     return table
 
 
-def _legend(table: vtk.vtkLookupTable, title: str, left: float) -> vtk.vtkScalarBarActor:
+def legend(table: vtk.vtkLookupTable, title: str, left: float) -> vtk.vtkScalarBarActor:
     legend = vtk.vtkScalarBarActor()
     legend.SetLookupTable(table)
     legend.SetTitle(title)
     legend.SetNumberOfLabels(3)
     legend.SetLabelFormat("%.1f")
-    legend.SetMaximumNumberOfColors(_SHADES)
+    legend.SetMaximumNumberOfColors(SHADES)
     legend.SetPosition(left, 0.2)
     legend.SetWidth(0.04)
     legend.SetHeight(0.6)
@@ -197,8 +197,8 @@ def _legend(table: vtk.vtkLookupTable, title: str, left: float) -> vtk.vtkScalar
     return legend
 
 
-def _place_camera(renderer: vtk.vtkRenderer, cell_size: float) -> None:
-    middle = _CELLS * cell_size / 2
+def place_camera(renderer: vtk.vtkRenderer, cell_size: float) -> None:
+    middle = CELLS * cell_size / 2
     camera = renderer.GetActiveCamera()
     camera.SetViewUp(0, 0, 1)
     camera.SetFocalPoint(middle, middle, middle)

@@ -119,3 +119,37 @@ def test_bad_input_is_one_line_and_leaves_no_file(
 
 def test_no_output_is_asked_for(capsys: Captured) -> None:
     assert "Missing option '-o'" in run(capsys, *CELL, "--subdivisions", "2").err
+
+
+def test_volumes_are_written_in_every_format(capsys: Captured, tmp_path: Path) -> None:
+    names = ["a.mesh", "a.xml", "a.json", "a.npz"]
+    outputs = [word for name in names for word in ("-o", str(tmp_path / name))]
+    captured = main(["volumes", *outputs, *CELL, "--degree", "3", "--json"])
+    summary = json.loads(capsys.readouterr().out)
+    assert captured == 0
+    expected = LATTICE.volumes(3)
+    assert summary["control_points"] == len(expected.control_points)
+    assert summary["degrees"] == [3, 3, 3]
+    assert [file["path"] for file in summary["files"]] == [str(tmp_path / name) for name in names]
+    assert json.loads((tmp_path / "a.json").read_text())["control_points"] == expected.control_points.tolist()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["-o", "a.mesh", "--degree", "2"], "--degree = 2: expected 1 or 3"),
+        (["-o", "a.vtu"], "ending in .mesh, .xml, .json, .npz"),
+        (["-o", "a.mesh", "-o", "./a.mesh"], "each file once"),
+        (["-o", "a.mesh", "--trim", "box"], "--trim = 'box'"),
+        ([], "Missing option '-o'"),
+    ],
+)
+def test_volumes_that_cannot_be_are_refused_in_one_line(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["volumes", *CELL, *options]) == 2
+    err = capsys.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert words in err
+    assert not list(tmp_path.iterdir())

@@ -16,17 +16,15 @@ from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.complex import CellComplex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.elements import BOTTOM, EDGE_FACES, TOP, ElementType, element_type
-from gyroid_cad.mesh.places import patch_places, place_count
+from gyroid_cad.mesh.places import FACE_A, FACE_B, FREE_WALLS, patch_places, place_count
 from gyroid_cad.nurbs import grid_points
 from gyroid_cad.wall import Wall
 
-__all__ = ["FACE_A", "FACE_B", "FREE_WALLS", "Mesh", "Surface", "hexahedra", "quadrilaterals"]
+__all__ = ["Mesh", "Surface", "hexahedra", "quadrilaterals"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Of the wall: A faces the labyrinth that the common normal points to, B the other; free walls close the lattice's rim.
-FACE_A, FACE_B, FREE_WALLS = "FACE_A", "FACE_B", "FREE_WALLS"
 # Of the mesh and of a file that is made of it, for each node of each element; and of what imports take.
 _BYTES_PER_ELEMENT_NODE, _BYTES_BEFORE = 60, 300_000_000
 # So few that what is computed for them stays in the processor's cache.

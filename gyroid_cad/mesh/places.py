@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from gyroid_cad.complex import CellComplex
 from gyroid_cad.nurbs import edge_row
 
-__all__ = ["patch_places", "place_count"]
+__all__ = ["FACE_A", "FACE_B", "FREE_WALLS", "patch_places", "place_count"]
 
 Integers = NDArray[np.int64]
+
+# Of the wall: A faces the labyrinth that the common normal points to, B the other; free walls close the lattice's rim.
+FACE_A, FACE_B, FREE_WALLS = "FACE_A", "FACE_B", "FREE_WALLS"
 
 
 def place_count(complex: CellComplex, steps: int) -> int:

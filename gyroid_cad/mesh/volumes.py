@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.complex import CellComplex, build_complex, connected
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.places import patch_places, place_count
+from gyroid_cad.mesh.places import FACE_A, FACE_B, FREE_WALLS, patch_places, place_count
 from gyroid_cad.nurbs_volume import NurbsVolume
 from gyroid_cad.wall import SIDES, Wall
 
@@ -30,7 +30,7 @@ Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 DEGREES_ACROSS = (1, 3)
-BOUNDARY_PARTS = ("side 0", "side 1", "free side walls")
+BOUNDARY_PARTS = (FACE_B, FACE_A, FREE_WALLS)
 # Of faces 0 to 5, turned so that their normals point out of the patch.
 FACE_CORNERS = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]])
 FACE_CORNERS.setflags(write=False)
@@ -38,7 +38,7 @@ FACE_CORNERS.setflags(write=False)
 # The face on edge k of a patch: v = -1, u = 1, v = 1, u = -1.
 _FACE_OF_EDGE = np.array([2, 1, 3, 0])
 _SIDE_FACES = (4, 5)
-_FREE = BOUNDARY_PARTS.index("free side walls")
+_FREE = BOUNDARY_PARTS.index(FREE_WALLS)
 # So many patches' control points at a time stay in the processor's cache.
 _PATCHES_AT_ONCE = 64
 

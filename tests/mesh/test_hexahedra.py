@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from gyroid_cad import Cylinder, Lattice
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.mesh.hexahedra import FACE_A, FACE_B, FREE_WALLS, Mesh, hexahedra, quadrilaterals
+from gyroid_cad.mesh.hexahedra import Mesh, hexahedra, quadrilaterals
+from gyroid_cad.mesh.places import FACE_A, FACE_B, FREE_WALLS
 from gyroid_cad.tube import face_area
 
 SIZE, THICKNESS = 10.0, 1.0

@@ -61,7 +61,10 @@ def test_vtk_reads_vtu_with_the_same_points_cells_and_arrays(name: str, tmp_path
 
 @pytest.fixture(scope="module")
 def gmsh() -> Any:
-    module = pytest.importorskip("gmsh", exc_type=ImportError)
+    try:
+        import gmsh as module
+    except (ImportError, OSError) as problem:
+        pytest.skip(f"Gmsh's library cannot be loaded: {problem}")
     module.initialize(interruptible=False)
     module.option.setNumber("General.Verbosity", 1)
     yield module

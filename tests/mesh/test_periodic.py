@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from gyroid_cad import Cylinder, Lattice
 from gyroid_cad.fit import FitSettings
-from gyroid_cad.mesh.hexahedra import FREE_WALLS, hexahedra
+from gyroid_cad.mesh.hexahedra import hexahedra
 from gyroid_cad.mesh.periodic import periodic_pairs
+from gyroid_cad.mesh.places import FREE_WALLS
 
 SIZE = 10.0
 ORDERS = [(1, False), (2, False), (2, True)]

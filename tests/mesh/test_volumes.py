@@ -11,7 +11,7 @@ from volume_cases import CELL_SIZE, KINDS, constant_wall, turned_placements, wal
 
 from gyroid_cad import FitSettings, Lattice, ParameterError
 from gyroid_cad.complex import build_complex
-from gyroid_cad.mesh.places import place_count
+from gyroid_cad.mesh.places import FACE_A, FACE_B, FREE_WALLS, place_count
 from gyroid_cad.mesh.volumes import (
     BOUNDARY_PARTS,
     FACE_CORNERS,
@@ -113,7 +113,7 @@ def test_every_face_of_every_patch_is_in_one_interface_or_in_the_boundary(kind: 
     assert np.all(
         volumes.boundary[volumes.boundary[:, 2] < 2, 1] == 4 + volumes.boundary[volumes.boundary[:, 2] < 2, 2]
     )
-    assert BOUNDARY_PARTS[2] == "free side walls"
+    assert BOUNDARY_PARTS == (FACE_B, FACE_A, FREE_WALLS)
 
 
 @pytest.mark.parametrize("kind", KINDS)

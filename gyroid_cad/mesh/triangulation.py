@@ -1,0 +1,204 @@
+"""The wall's surface as triangles: closed, oriented outwards, within a deviation of the wall's NURBS faces.
+
+The lattice knows its own topology: patches share the places along their common edges and at their fans by number,
+side walls share theirs with the faces. Nothing is merged by distance, and no kernel is asked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.arrays import freeze_arrays
+from gyroid_cad.mesh.measuring import enclosed_volume
+from gyroid_cad.mesh.subdivision import Subdivision, subdivided
+from gyroid_cad.stages import Progress, tell
+from gyroid_cad.wall import Wall
+
+__all__ = ["TriangleReport", "Triangulation", "triangle_report", "triangulated"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+STAGE = "triangles"
+# How far triangles that touch in a line without belonging together are parted: a thousandth of the deviation, but
+# enough for the single-precision numbers of STL and 3MF to tell them apart. The kernel's writer does the same.
+_PARTING = 1e-3
+_SINGLE_PRECISION_STEPS = 8
+# Of the secant method for the volume: each step squares what is left, and the first leaves 1e-5.
+_SECANT_STEPS = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triangulation:
+    """How a wall is cut into triangles.
+
+    Attributes
+    ----------
+    wall : Wall
+        On whose faces the corners of all triangles lie: the wall, a little thicker, as :func:`triangulated` says.
+    patch_steps : ndarray of int, shape (patches,)
+        Along each side of a patch, inside it.
+    edge_steps : ndarray of int, shape (edges,)
+    across : int
+        Steps of the free side walls, through the wall.
+    deviation : float
+        Largest distance of a triangle from the wall's faces, in mm, as measured.
+    laid_off : float
+        In mm, how far from the wall's faces the corners lie at most.
+    parting : float
+        In mm, how far corners are moved where patches touch in a line without joining.
+    volume : float
+        That the triangles enclose, in mm3, before they are parted.
+    """
+
+    wall: Wall
+    patch_steps: Integers
+    edge_steps: Integers
+    across: int
+    deviation: float
+    laid_off: float
+    parting: float
+    volume: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def triangle_count(self) -> int:
+        """Of both faces and the free side walls."""
+        edges = self.edge_steps[self.wall.complex.patch_edges].sum()
+        faces = np.sum(2 * (self.patch_steps - 2) ** 2 + 4 * (self.patch_steps - 2)) + edges
+        return int(2 * faces + 2 * self.across * self.edge_steps[self.wall.complex.free].sum())
+
+
+@dataclass(frozen=True, slots=True)
+class TriangleReport:
+    """What the triangles of a lattice are worth.
+
+    Attributes
+    ----------
+    cells : tuple of int
+    patches, triangles : int
+    fewest_steps, most_steps : int
+        Squares along a side of a patch, each two triangles.
+    steps_through : int
+        Of the free side walls, from face to face.
+    free_edges : int
+        Mid-surface edges that bound one patch only: each carries a ruled side wall.
+    pinch_lines : int
+        Lines through the wall in which patches touch without joining; there triangles are parted by a hair.
+    volume, volume_wall : float
+        In mm3: enclosed by the triangles, and by the NURBS faces.
+    deviation : float
+        Largest distance between triangles and NURBS faces, in mm, as measured.
+    laid_off : float
+        In mm, how far corners of triangles lie outside the faces at most, for the sake of the volume.
+    """
+
+    cells: tuple[int, int, int]
+    patches: int
+    triangles: int
+    fewest_steps: int
+    most_steps: int
+    steps_through: int
+    free_edges: int
+    pinch_lines: int
+    volume: float
+    volume_wall: float
+    deviation: float
+    laid_off: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain values, ready for JSON."""
+        return asdict(self)
+
+
+def triangulated(wall: Wall, deviation: float, progress: Progress | None = None) -> Triangulation:
+    """Find the steps with which triangles keep within a deviation of a wall.
+
+    Triangles with their corners on the faces of a gyroid wall enclose too little, about as much as they deviate. So
+    the corners are laid off along the lines through the wall, all by the same small part of its thickness, until
+    the triangles enclose the wall's own volume. Faces, edges and side walls stay those of one wall, a little thicker,
+    and the deviation counts what was added.
+
+    Parameters
+    ----------
+    wall : Wall
+    deviation : float
+        Largest distance of a triangle from the wall's faces and side walls, in mm.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    ParameterError
+        If a patch would take too many steps, saying which deviation would do.
+    """
+    tell(progress, STAGE, 0, 1)
+    volume, thickest = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
+    laid_off = 0.0
+    while True:
+        steps = subdivided(wall, deviation - laid_off)
+        thicker, enclosed, part = _of_volume(wall, steps, volume)
+        laid_off = abs(part) * thickest
+        if steps.deviation + laid_off <= deviation:
+            break
+    furthest = float(np.abs(thicker.nets).max() + np.abs(wall.shifts).max())
+    parting = max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
+    tell(progress, STAGE, 1, 1)
+    return Triangulation(
+        wall=thicker,
+        patch_steps=steps.patch_steps,
+        edge_steps=steps.edge_steps,
+        across=steps.across,
+        deviation=steps.deviation + laid_off,
+        laid_off=laid_off,
+        parting=parting,
+        volume=enclosed,
+    )
+
+
+def triangle_report(triangulation: Triangulation, wall: Wall) -> TriangleReport:
+    """The report on triangles, beside the wall they were made of."""
+    complex = wall.complex
+    return TriangleReport(
+        cells=complex.cells,
+        patches=complex.patch_count,
+        triangles=triangulation.triangle_count,
+        fewest_steps=int(triangulation.patch_steps.min()),
+        most_steps=int(triangulation.patch_steps.max()),
+        steps_through=triangulation.across,
+        free_edges=int(complex.free.sum()),
+        pinch_lines=complex.pinch_lines,
+        volume=triangulation.volume,
+        volume_wall=wall.volume(),
+        deviation=triangulation.deviation,
+        laid_off=triangulation.laid_off,
+    )
+
+
+def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, float, float]:
+    """The wall laid off so that its triangles enclose a volume, what they enclose, and by which part of itself."""
+    part, thicker = 0.0, wall
+    enclosed = enclosed_volume(wall, steps.patch_steps, steps.edge_steps, steps.across)
+    # Of a thin wall the volume goes with the thickness, which grows on both sides.
+    following = (volume / enclosed - 1) / 2
+    for _ in range(_SECANT_STEPS):
+        if following == part:
+            break
+        thicker = _laid_off(wall, following)
+        found = enclosed_volume(thicker, steps.patch_steps, steps.edge_steps, steps.across)
+        slope = (found - enclosed) / (following - part)
+        part, enclosed = following, found
+        following = part + (volume - enclosed) / slope
+    return thicker, enclosed, part
+
+
+def _laid_off(wall: Wall, part: float) -> Wall:
+    """The wall with both faces moved outwards by a part of its thickness."""
+    through = part * (wall.nets[:, 1] - wall.nets[:, 0])
+    return replace(wall, nets=wall.nets + np.stack([-through, through], axis=1))

@@ -95,7 +95,7 @@ def _enough(steps: Integers, deviation: Floats, limit: float) -> Integers:
     """Steps that would do, from what some steps gave: the deviation goes with 1 / n^2."""
     more = np.ceil(steps * np.sqrt(deviation / limit) * (1 - _HAIR)).astype(np.int64)
     # Where they do not do yet, one more at least.
-    return np.maximum(np.where(deviation > limit, np.maximum(more, steps + 1), more), FEWEST_STEPS)
+    return np.asarray(np.maximum(np.where(deviation > limit, np.maximum(more, steps + 1), more), FEWEST_STEPS))
 
 
 def _rounded(steps: Integers) -> Integers:

@@ -6,8 +6,7 @@ side walls share theirs with the faces. Nothing is merged by distance, and no ke
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +14,13 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.mesh.measuring import enclosed_volume
 from gyroid_cad.mesh.subdivision import Subdivision, subdivided
-from gyroid_cad.stages import Progress, tell
 from gyroid_cad.wall import Wall
 
-__all__ = ["TriangleReport", "Triangulation", "triangle_report", "triangulated"]
+__all__ = ["Triangulation", "triangulated"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-STAGE = "triangles"
 # How far triangles that touch in a line without belonging together are parted: a thousandth of the deviation, but
 # enough for the single-precision numbers of STL and 3MF to tell them apart. The kernel's writer does the same.
 _PARTING = 1e-3
@@ -75,49 +72,7 @@ class Triangulation:
         return int(2 * faces + 2 * self.across * self.edge_steps[self.wall.complex.free].sum())
 
 
-@dataclass(frozen=True, slots=True)
-class TriangleReport:
-    """What the triangles of a lattice are worth.
-
-    Attributes
-    ----------
-    cells : tuple of int
-    patches, triangles : int
-    fewest_steps, most_steps : int
-        Squares along a side of a patch, each two triangles.
-    steps_through : int
-        Of the free side walls, from face to face.
-    free_edges : int
-        Mid-surface edges that bound one patch only: each carries a ruled side wall.
-    pinch_lines : int
-        Lines through the wall in which patches touch without joining; there triangles are parted by a hair.
-    volume, volume_wall : float
-        In mm3: enclosed by the triangles, and by the NURBS faces.
-    deviation : float
-        Largest distance between triangles and NURBS faces, in mm, as measured.
-    laid_off : float
-        In mm, how far corners of triangles lie outside the faces at most, for the sake of the volume.
-    """
-
-    cells: tuple[int, int, int]
-    patches: int
-    triangles: int
-    fewest_steps: int
-    most_steps: int
-    steps_through: int
-    free_edges: int
-    pinch_lines: int
-    volume: float
-    volume_wall: float
-    deviation: float
-    laid_off: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report as plain values, ready for JSON."""
-        return asdict(self)
-
-
-def triangulated(wall: Wall, deviation: float, progress: Progress | None = None) -> Triangulation:
+def triangulated(wall: Wall, deviation: float) -> Triangulation:
     """Find the steps with which triangles keep within a deviation of a wall.
 
     Triangles with their corners on the faces of a gyroid wall enclose too little, about as much as they deviate. So
@@ -130,15 +85,12 @@ def triangulated(wall: Wall, deviation: float, progress: Progress | None = None)
     wall : Wall
     deviation : float
         Largest distance of a triangle from the wall's faces and side walls, in mm.
-    progress : callable, optional
-        Called with (stage, done, total).
 
     Raises
     ------
     ParameterError
         If a patch would take too many steps, saying which deviation would do.
     """
-    tell(progress, STAGE, 0, 1)
     volume, thickest = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
     laid_off = 0.0
     while True:
@@ -149,7 +101,6 @@ def triangulated(wall: Wall, deviation: float, progress: Progress | None = None)
             break
     furthest = float(np.abs(thicker.nets).max() + np.abs(wall.shifts).max())
     parting = max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
-    tell(progress, STAGE, 1, 1)
     return Triangulation(
         wall=thicker,
         patch_steps=steps.patch_steps,
@@ -159,25 +110,6 @@ def triangulated(wall: Wall, deviation: float, progress: Progress | None = None)
         laid_off=laid_off,
         parting=parting,
         volume=enclosed,
-    )
-
-
-def triangle_report(triangulation: Triangulation, wall: Wall) -> TriangleReport:
-    """The report on triangles, beside the wall they were made of."""
-    complex = wall.complex
-    return TriangleReport(
-        cells=complex.cells,
-        patches=complex.patch_count,
-        triangles=triangulation.triangle_count,
-        fewest_steps=int(triangulation.patch_steps.min()),
-        most_steps=int(triangulation.patch_steps.max()),
-        steps_through=triangulation.across,
-        free_edges=int(complex.free.sum()),
-        pinch_lines=complex.pinch_lines,
-        volume=triangulation.volume,
-        volume_wall=wall.volume(),
-        deviation=triangulation.deviation,
-        laid_off=triangulation.laid_off,
     )
 
 

@@ -19,8 +19,9 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.fit import FitSettings
+from gyroid_cad.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.kernel.check import enclosed_volume
-from gyroid_cad.kernel.stl import DEFAULT_ANGLE, require_meshing, write_stl
+from gyroid_cad.kernel.stl import write_stl
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.wall import SIDES
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.mesh.measuring import canonical_edges
-from gyroid_cad.mesh.templates import Template, face_template, rational_basis, wall_template
+from gyroid_cad.mesh.templates import Template, face_template, images, rational_basis, wall_template
 from gyroid_cad.mesh.triangulation import Triangulation
 from gyroid_cad.nurbs import basis, edge_row
 
@@ -102,9 +102,10 @@ class Corners:
 
         def inside(patches: Integers) -> Singles:
             controls = wall.nets[wall.patch_net[patches]].reshape(len(patches), 2, -1, 3)
-            # One product for all patches: far quicker than one for each.
-            places = np.moveaxis(np.tensordot(controls, matrix, (2, 1)), 2, 3)
-            return places.reshape(len(patches), 2, -1).astype(np.float32)
+            # Both faces in one product.
+            places = images(matrix, np.moveaxis(controls, 1, 2).reshape(len(patches), -1, 6))
+            places = np.moveaxis(places.reshape(len(patches), -1, 2, 3), 2, 1)
+            return places.astype(np.float32).reshape(len(patches), 2, -1)
 
         # Of patches that differ by translations one is evaluated.
         once = inside(group.patches[:1]) if group.alike else None

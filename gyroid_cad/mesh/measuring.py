@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.mesh.templates import Template, face_template, rational_basis, wall_template
+from gyroid_cad.mesh.templates import Template, face_template, images, rational_basis, wall_template
 from gyroid_cad.nurbs import edge_row
 from gyroid_cad.wall import Wall
 
@@ -186,19 +186,17 @@ class _Matrices:
 
     def measured(self, controls: Floats) -> Measured:
         """Measure surfaces, control points of shape (surfaces, controls, 3)."""
-        count = len(controls)
-        flat = np.moveaxis(controls, 0, -1).reshape(controls.shape[1], -1)
 
         def applied(matrix: Floats) -> Floats:
-            """Components first, then places and surfaces."""
-            return np.moveaxis((matrix @ flat).reshape(len(matrix), 3, count), 1, 0)
+            """Components first, then surfaces and places."""
+            return np.ascontiguousarray(np.moveaxis(images(matrix, controls), -1, 0))
 
         normals = _cross(applied(self.rates[0]), applied(self.rates[1]))
         off = np.abs(np.sum(applied(self.chords) * normals, axis=0)) / np.sqrt(np.sum(normals**2, axis=0))
         points = applied(self.nodes)
-        a, b, c = (points[:, self.triangles[:, k]] for k in range(3))
+        a, b, c = (points[:, :, self.triangles[:, k]] for k in range(3))
         twice = _cross(b - a, c - a)
-        return Measured(off.max(axis=0, initial=0.0), np.sum(a * twice, axis=(0, 1)) / 6, twice.sum(axis=1).T / 2)
+        return Measured(off.max(axis=1, initial=0.0), np.sum(a * twice, axis=(0, 2)) / 6, twice.sum(axis=2).T / 2)
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

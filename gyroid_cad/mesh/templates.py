@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.nurbs import basis
 
-__all__ = ["FEWEST_STEPS", "Template", "face_template", "rational_basis", "wall_template"]
+__all__ = ["FEWEST_STEPS", "Template", "face_template", "images", "rational_basis", "wall_template"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -23,6 +23,8 @@ Integers = NDArray[np.int64]
 # One place at least lies inside a patch: what the strips along its edges are stitched to.
 FEWEST_STEPS = 2
 _REMEMBERED = 256
+# Of rows, columns and length of a product.
+_ONE_THREAD = 2**18
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +116,26 @@ def rational_basis(weights: Floats, knots: tuple[Floats, Floats], places: Floats
     by_u = (weighted_u - weighted_u.sum(axis=1, keepdims=True) * functions) / total
     by_v = (weighted_v - weighted_v.sum(axis=1, keepdims=True) * functions) / total
     return np.stack([functions, by_u, by_v])
+
+
+def images(matrix: Floats, controls: Floats) -> Floats:
+    """Products of one matrix with the control points of many surfaces.
+
+    In portions so small that OpenBLAS keeps to one thread (``GEMM_MULTITHREAD_THRESHOLD`` in its sources): on a busy
+    machine its threads wait for each other, and products of this size take twenty times as long.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (places, controls)
+    controls : ndarray, shape (surfaces, controls, components)
+
+    Returns
+    -------
+    ndarray, shape (surfaces, places, components)
+    """
+    rows = max(1, _ONE_THREAD // (controls.shape[1] * controls.shape[2]))
+    parts = [matrix[first : first + rows] @ controls for first in range(0, len(matrix), rows)]
+    return np.concatenate(parts, axis=1) if parts else np.empty((len(controls), 0, controls.shape[2]))
 
 
 def _template(places: Floats, triangles: Integers) -> Template:

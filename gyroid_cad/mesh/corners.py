@@ -98,7 +98,7 @@ class Corners:
         wall, complex = self._wall, self._wall.complex
         first = sum(group.edge_steps)
         knots = (wall.knots, wall.knots)
-        matrix = rational_basis(wall.weights, knots, group.template.places[first:])[0]
+        matrix = rational_basis(wall.weights, knots, group.template.places[first:])
 
         def inside(patches: Integers) -> Singles:
             controls = wall.nets[wall.patch_net[patches]].reshape(len(patches), 2, -1, 3)

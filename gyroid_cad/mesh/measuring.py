@@ -7,42 +7,23 @@ measured by a few products.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.mesh.templates import Template, face_template, images, rational_basis, wall_template
+from gyroid_cad.mesh.templates import Template, basis_rates, face_template, images, rational_basis, wall_template
 from gyroid_cad.nurbs import edge_row
 from gyroid_cad.wall import Wall
 
-__all__ = ["Measured", "canonical_edges", "enclosed_volume", "face_cases", "measured_faces", "measured_side_walls"]
+__all__ = ["canonical_edges", "enclosed_volume", "face_cases", "face_deviations", "side_deviations"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Key = tuple[int, int, int, int, int]
 
-_NUMBERS_AT_ONCE = 3_000_000
+# So few that their matrices, and what is worked out of them, stay small.
+_SAMPLES_AT_ONCE = 4000
+_PLACES_AT_ONCE = 100_000
 _ACROSS_KNOTS = np.array([0.0, 0.0, 1.0, 1.0])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """What was measured of faces, or of side walls.
-
-    Attributes
-    ----------
-    deviation : ndarray, shape (cases,)
-        Largest distance between triangles and surface, along its normal, in mm.
-    volume : ndarray, shape (cases,)
-        Sum over the triangles of det(a, b, c) / 6, in mm3.
-    area : ndarray, shape (cases, 3)
-        Sum of their vectors of area, in mm2.
-    """
-
-    deviation: Floats
-    volume: Floats
-    area: Floats
 
 
 def canonical_edges(wall: Wall, edges: Integers) -> tuple[Integers, Integers]:
@@ -72,35 +53,29 @@ def face_cases(wall: Wall, patch_steps: Integers, edge_steps: Integers) -> tuple
     return cases, which.ravel()
 
 
-def measured_faces(wall: Wall, cases: Integers, deviation: bool = True) -> Measured:
-    """The worse of both faces of each case; volume and area of both together, oriented outwards.
+def face_deviations(wall: Wall, cases: Integers) -> Floats:
+    """Largest distance in mm between triangles and faces, along the normal, of each case; the worse of both faces.
 
     Parameters
     ----------
     wall : Wall
     cases : ndarray of int, shape (cases, 6)
         As of :func:`face_cases`.
-    deviation : bool
-        Whether to measure it; else it is 0.
     """
-    result = _empty(len(cases))
-    keys, which = np.unique(cases[:, :5], axis=0, return_inverse=True)
-    for number, key in enumerate(keys.tolist()):
-        template = face_template(key[0], (key[1], key[2], key[3], key[4]))
-        matrices = _Matrices.of(template, wall.weights, (wall.knots, wall.knots), deviation)
-        for some in _portions(np.flatnonzero(which.ravel() == number), 2 * matrices.size):
-            controls = wall.nets[cases[some, 5]]
-            both = matrices.measured(controls.reshape(2 * len(some), -1, 3))
-            result.deviation[some] = both.deviation.reshape(-1, 2).max(axis=1)
-            result.volume[some] = np.diff(both.volume.reshape(-1, 2))[:, 0]
-            result.area[some] = np.diff(both.area.reshape(-1, 2, 3), axis=1)[:, 0]
-    return result
+    deviations = np.zeros((len(cases), 2))
+    for template, members in _by_template(cases):
+        for chords, rates in _sampled(template, wall.weights, (wall.knots, wall.knots)):
+            for some in _portions(members, 2 * len(chords)):
+                controls = wall.nets[cases[some, 5]].reshape(2 * len(some), -1, 3)
+                found = _deviations(chords, rates, controls).reshape(-1, 2)
+                deviations[some] = np.maximum(deviations[some], found)
+    return np.asarray(deviations.max(axis=1))
 
 
-def measured_side_walls(
+def side_deviations(
     wall: Wall, free: Integers, steps: Integers, template: Callable[[int], Template]
-) -> tuple[Measured, Integers]:
-    """Distinct side walls with distinct steps along them, and which of them each free edge has.
+) -> tuple[Floats, Integers]:
+    """The same of distinct side walls with distinct steps along them, and which of them each free edge has.
 
     Parameters
     ----------
@@ -110,95 +85,112 @@ def measured_side_walls(
     template : callable
         From the steps along a side wall to its triangles.
     """
-    rows = canonical_edges(wall, free)[1]
-    keys, which = np.unique(np.column_stack([steps, rows]), axis=0, return_inverse=True)
-    result = _empty(len(keys))
-    for along, edge in np.unique(np.column_stack([keys[:, 0], keys[:, 1] % 4]), axis=0).tolist():
-        weights = np.repeat(edge_row(wall.weights, edge)[:, np.newaxis], 2, axis=1)
-        matrices = _Matrices.of(template(along), weights, (wall.knots, _ACROSS_KNOTS))
-        for some in _portions(np.flatnonzero((keys[:, 0] == along) & (keys[:, 1] % 4 == edge)), matrices.size):
-            # Of the nets' axes (wall, side, u, v, component) the first two of each patch's own grid are wanted first.
-            nets = wall.nets[keys[some, 1] // 4].transpose(2, 3, 0, 1, 4)
-            rails = edge_row(nets, edge).transpose(1, 0, 2, 3)
-            measured = matrices.measured(rails.reshape(len(some), -1, 3))
-            result.deviation[some] = measured.deviation
-            result.volume[some] = measured.volume
-            result.area[some] = measured.area
-    return result, which.ravel()
+    keys, which = _side_cases(wall, free, steps)
+    deviations = np.zeros(len(keys))
+    for along, edge, members in _by_edge(keys):
+        weights, rails = _rails(wall, keys[members, 1] // 4, edge)
+        for chords, rates in _sampled(template(along), weights, (wall.knots, _ACROSS_KNOTS)):
+            deviations[members] = np.maximum(deviations[members], _deviations(chords, rates, rails))
+    return deviations, which
 
 
 def enclosed_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers, across: int) -> float:
     """Volume in mm3 that the triangles of faces and side walls enclose, by the divergence theorem."""
     shifts = wall.shifts[wall.patch_shift]
     cases, which = face_cases(wall, patch_steps, edge_steps)
-    volume = _shifted_volume(measured_faces(wall, cases, deviation=False), which, shifts)
+    # Of each case the sum of det(a, b, c) / 6, and then the vector of area.
+    sums = np.zeros((len(cases), 4))
+    for template, members in _by_template(cases):
+        nodes = rational_basis(wall.weights, (wall.knots, wall.knots), template.places)
+        for some in _portions(members, 2 * len(nodes)):
+            controls = wall.nets[cases[some, 5]].reshape(2 * len(some), -1, 3)
+            below, above = np.moveaxis(_sums(template, nodes, controls).reshape(-1, 2, 4), 1, 0)
+            sums[some] = above - below
+    volume = _shifted(sums[which], shifts)
     free = np.flatnonzero(wall.complex.free)
-    sides, which = measured_side_walls(wall, free, edge_steps[free], lambda along: wall_template(along, across))
-    return volume + _shifted_volume(sides, which, shifts[canonical_edges(wall, free)[0]])
+    keys, which = _side_cases(wall, free, edge_steps[free])
+    sums = np.zeros((len(keys), 4))
+    for along, edge, members in _by_edge(keys):
+        weights, rails = _rails(wall, keys[members, 1] // 4, edge)
+        template = wall_template(along, across)
+        sums[members] = _sums(template, rational_basis(weights, (wall.knots, _ACROSS_KNOTS), template.places), rails)
+    return volume + _shifted(sums[which], shifts[canonical_edges(wall, free)[0]])
 
 
-def _shifted_volume(measured: Measured, which: Integers, shifts: Floats) -> float:
-    """Sum over places of what det(a, b, c) / 6 becomes when everything is shifted."""
-    return float(measured.volume[which].sum() + np.sum(measured.area[which] * shifts) / 3)
+def _by_template(cases: Integers) -> Iterator[tuple[Template, Integers]]:
+    keys, which = np.unique(cases[:, :5], axis=0, return_inverse=True)
+    for number, key in enumerate(keys.tolist()):
+        yield face_template(key[0], (key[1], key[2], key[3], key[4])), np.flatnonzero(which.ravel() == number)
 
 
-def _empty(count: int) -> Measured:
-    return Measured(np.zeros(count), np.zeros(count), np.zeros((count, 3)))
+def _side_cases(wall: Wall, free: Integers, steps: Integers) -> tuple[Integers, Integers]:
+    """Distinct pairs of steps and canonical edge, and which of them each free edge has."""
+    keys, which = np.unique(np.column_stack([steps, canonical_edges(wall, free)[1]]), axis=0, return_inverse=True)
+    return keys, which.ravel()
 
 
-def _portions(members: Integers, numbers_each: int) -> Iterator[Integers]:
-    size = max(1, _NUMBERS_AT_ONCE // numbers_each)
-    return (members[first : first + size] for first in range(0, len(members), size))
+def _by_edge(keys: Integers) -> Iterator[tuple[int, int, Integers]]:
+    """Steps, edge of the patch, and the side walls that have both."""
+    kinds, which = np.unique(np.column_stack([keys[:, 0], keys[:, 1] % 4]), axis=0, return_inverse=True)
+    for number, (along, edge) in enumerate(kinds.tolist()):
+        yield along, edge, np.flatnonzero(which.ravel() == number)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Matrices:
-    """A template's places, and the places where it is measured, as matrices on control points.
+def _rails(wall: Wall, nets: Integers, edge: int) -> tuple[Floats, Floats]:
+    """Weights (n, 2) and control points (nets, 2 n, 3) of side walls, those of ``Wall.side_wall`` for many nets."""
+    weights = np.repeat(edge_row(wall.weights, edge)[:, np.newaxis], 2, axis=1)
+    # The first two axes are to be those of the patch's grid.
+    row = edge_row(wall.nets[nets].transpose(2, 3, 0, 1, 4), edge)
+    return weights, row.transpose(1, 0, 2, 3).reshape(len(nets), -1, 3)
 
-    Attributes
-    ----------
-    triangles : ndarray of int, shape (triangles, 3)
-    nodes : ndarray, shape (places, controls)
+
+def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) -> Iterator[tuple[Floats, Floats]]:
+    """Matrices on control points, of some centroids of triangles and middles of their sides at a time.
+
+    Yields
+    ------
     chords : ndarray, shape (samples, controls)
-        From the surface to the triangles, at centroids of triangles and at middles of sides.
+        From the surface to the triangles.
     rates : ndarray, shape (2, samples, controls)
-        Derivatives of the surface there.
+        Derivatives of the surface.
     """
+    nodes = rational_basis(weights, knots, template.places)
+    for part in (template.triangles, template.sides):
+        for first in range(0, len(part), _SAMPLES_AT_ONCE):
+            some = part[first : first + _SAMPLES_AT_ONCE]
+            at = template.places[some].mean(axis=1)
+            yield nodes[some].mean(axis=1) - rational_basis(weights, knots, at), basis_rates(weights, knots, at)
 
-    triangles: Integers
-    nodes: Floats
-    chords: Floats
-    rates: Floats
 
-    @classmethod
-    def of(cls, template: Template, weights: Floats, knots: tuple[Floats, Floats], deviation: bool = True) -> _Matrices:
-        nodes = rational_basis(weights, knots, template.places)[0]
-        parts = (template.triangles, template.sides) if deviation else ()
-        at = np.concatenate([np.empty((0, 2)), *(template.places[part].mean(axis=1) for part in parts)])
-        flat = np.concatenate([np.empty((0, weights.size)), *(nodes[part].mean(axis=1) for part in parts)])
-        samples = rational_basis(weights, knots, at)
-        return cls(template.triangles, nodes, flat - samples[0], samples[1:])
+def _deviations(chords: Floats, rates: Floats, controls: Floats) -> Floats:
+    normals = _cross(_components(rates[0], controls), _components(rates[1], controls))
+    along = np.abs(np.sum(_components(chords, controls) * normals, axis=0))
+    return np.asarray(np.max(along / np.sqrt(np.sum(normals**2, axis=0)), axis=1))
 
-    @property
-    def size(self) -> int:
-        """Numbers that one surface takes while it is measured."""
-        return 9 * (len(self.chords) + len(self.nodes))
 
-    def measured(self, controls: Floats) -> Measured:
-        """Measure surfaces, control points of shape (surfaces, controls, 3)."""
+def _sums(template: Template, nodes: Floats, controls: Floats) -> Floats:
+    """Of surfaces, the sum over triangles of det(a, b, c) / 6, and that of the vectors of area; (surfaces, 4)."""
+    points = _components(nodes, controls)
+    a, b, c = (points[:, :, template.triangles[:, k]] for k in range(3))
+    twice = _cross(b - a, c - a)
+    return np.column_stack([np.sum(a * twice, axis=(0, 2)) / 6, twice.sum(axis=2).T / 2])
 
-        def applied(matrix: Floats) -> Floats:
-            """Components first, then surfaces and places."""
-            return np.ascontiguousarray(np.moveaxis(images(matrix, controls), -1, 0))
 
-        normals = _cross(applied(self.rates[0]), applied(self.rates[1]))
-        off = np.abs(np.sum(applied(self.chords) * normals, axis=0)) / np.sqrt(np.sum(normals**2, axis=0))
-        points = applied(self.nodes)
-        a, b, c = (points[:, :, self.triangles[:, k]] for k in range(3))
-        twice = _cross(b - a, c - a)
-        return Measured(off.max(axis=1, initial=0.0), np.sum(a * twice, axis=(0, 2)) / 6, twice.sum(axis=2).T / 2)
+def _components(matrix: Floats, controls: Floats) -> Floats:
+    """Products with the control points; components first, then surfaces and places."""
+    return np.ascontiguousarray(np.moveaxis(images(matrix, controls), -1, 0))
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
     """Vector products, components first: several times quicker than ``numpy.cross``."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _shifted(sums: Floats, shifts: Floats) -> float:
+    """Volume, when every surface is shifted from where it was summed."""
+    return float(sums[:, 0].sum() + np.sum(sums[:, 1:] * shifts) / 3)
+
+
+def _portions(members: Integers, places_each: int) -> Iterator[Integers]:
+    size = max(1, _PLACES_AT_ONCE // places_each)
+    return (members[first : first + size] for first in range(0, len(members), size))

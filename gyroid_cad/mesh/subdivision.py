@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.measuring import face_cases, measured_faces, measured_side_walls
+from gyroid_cad.mesh.measuring import face_cases, face_deviations, side_deviations
 from gyroid_cad.mesh.templates import FEWEST_STEPS, Template, wall_template
 from gyroid_cad.wall import Wall
 
@@ -25,8 +25,10 @@ Integers = NDArray[np.int64]
 # Between the places measured a triangle may be further off: of a quadratic surface by at most 3 %.
 _MARGIN = 1.05
 _FIRST_STEPS = 8
-# More steps along a patch than anybody prints, and few enough for the matrices to stay small.
-MOST_STEPS = 256
+# There triangles are nearer to the faces, about 1e-5 of the cell size, than the usual fit is to the exact gyroid.
+MOST_STEPS = 128
+# Between the deviation that would just do and the one named as possible: corners are laid off, counts rounded up.
+_SLACK = 1.5
 # Where counts are more than these they are rounded up to three binary digits, so that few templates are needed.
 _FEW_COUNTS = 4
 # Of a side wall's deviation, what its curved edges may take; its twist takes the rest.
@@ -59,7 +61,7 @@ class Subdivision:
         freeze_arrays(self)
 
 
-def subdivided(wall: Wall, deviation: float) -> Subdivision:
+def subdivided(wall: Wall, deviation: float, reserved: float = 0.0) -> Subdivision:
     """The fewest steps with which triangles that have their corners on the wall keep within a deviation.
 
     Parameters
@@ -67,23 +69,26 @@ def subdivided(wall: Wall, deviation: float) -> Subdivision:
     wall : Wall
     deviation : float
         Largest distance of a triangle from the wall's faces and side walls, in mm.
+    reserved : float
+        What of it is not to be used, in mm.
 
     Raises
     ------
     ParameterError
         If a patch would take too many steps, saying which deviation would do.
     """
-    limit = deviation / _MARGIN
+    limit = (deviation - reserved) / _MARGIN
     distinct = np.arange(len(wall.nets))
     first = np.column_stack([np.full((len(distinct), 5), _FIRST_STEPS), distinct])
-    patch_steps = _rounded(_enough(first[:, 0], measured_faces(wall, first).deviation, limit))[wall.patch_net]
+    patch_steps = _rounded(_enough(first[:, 0], face_deviations(wall, first), limit))[wall.patch_net]
     free = np.flatnonzero(wall.complex.free)
     while True:
         _require_few(patch_steps, deviation)
         edge_steps = _steps_of_edges(wall, patch_steps)
         edge_steps[free] = _rounded(_steps_of_side_walls(wall, free, edge_steps[free], limit))
+        _require_few(edge_steps, deviation)
         cases, which = face_cases(wall, patch_steps, edge_steps)
-        faces = measured_faces(wall, cases).deviation
+        faces = face_deviations(wall, cases)
         if faces.max() <= limit:
             break
         patch_steps = _rounded(np.maximum(patch_steps, _enough(cases[:, 0], faces, limit)[which]))
@@ -109,11 +114,11 @@ def _rounded(steps: Integers) -> Integers:
 def _require_few(steps: Integers, deviation: float) -> None:
     most = int(steps.max())
     if most > MOST_STEPS:
-        possible = deviation * (most / MOST_STEPS) ** 2
+        possible = deviation * (most / MOST_STEPS) ** 2 * _SLACK
         raise ParameterError(
             "deviation",
             deviation,
-            f"about {possible:.2g} mm or more: it takes {most} x {most} squares a patch, {MOST_STEPS} x {MOST_STEPS} "
+            f"about {possible:.1e} mm or more: it takes {most} x {most} squares a patch, {MOST_STEPS} x {MOST_STEPS} "
             "are the most",
         )
 
@@ -127,29 +132,28 @@ def _steps_of_edges(wall: Wall, patch_steps: Integers) -> Integers:
 
 def _steps_of_side_walls(wall: Wall, free: Integers, steps: Integers, limit: float) -> Integers:
     """Steps along free edges, raised where the lines along the side walls would take too much of the deviation."""
-    share = _SHARE_OF_EDGES * limit
-    while True:
-        measured, which = measured_side_walls(wall, free, steps, _rails)
-        enough = np.maximum(steps, _enough(steps, measured.deviation[which], share))
+    while np.all(steps <= MOST_STEPS):
+        deviations, which = side_deviations(wall, free, steps, _lines_along)
+        enough = np.maximum(steps, _enough(steps, deviations[which], _SHARE_OF_EDGES * limit))
         if np.array_equal(enough, steps):
-            return steps
+            break
         steps = enough
-        _require_few(steps, limit)
+    return steps
 
 
 def _through(wall: Wall, free: Integers, steps: Integers, limit: float) -> tuple[int, float]:
     """Steps through the wall with which all side walls keep within the deviation, and what it is with them."""
     across = 1
     while True:
-        measured, _ = measured_side_walls(wall, free, steps, lambda along: wall_template(along, across))  # noqa: B023
-        worst = float(measured.deviation.max(initial=0.0))
+        deviations, _ = side_deviations(wall, free, steps, lambda along: wall_template(along, across))  # noqa: B023
+        worst = float(deviations.max(initial=0.0))
         if worst <= limit:
             return across, worst
         # What the twist takes falls with 1 / n; the curved edges take at most their share.
         across = max(across + 1, int(np.ceil(across * worst / limit * (1 - _HAIR))))
 
 
-def _rails(along: int) -> Template:
+def _lines_along(along: int) -> Template:
     """The lines along a side wall at both its edges and half way between, without triangles."""
     full = wall_template(along, 2)
     same = full.places[full.sides[:, 0], 1] == full.places[full.sides[:, 1], 1]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.nurbs import basis
 
-__all__ = ["FEWEST_STEPS", "Template", "face_template", "images", "rational_basis", "wall_template"]
+__all__ = ["FEWEST_STEPS", "Template", "basis_rates", "face_template", "images", "rational_basis", "wall_template"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -90,7 +90,7 @@ def wall_template(along: int, across: int) -> Template:
 
 
 def rational_basis(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
-    """Rational basis functions and their first derivatives (The NURBS Book, eq. (4.12)) as matrices on control points.
+    """Rational basis functions (The NURBS Book, eq. (4.12)) as a matrix on control points.
 
     Parameters
     ----------
@@ -101,21 +101,29 @@ def rational_basis(weights: Floats, knots: tuple[Floats, Floats], places: Floats
 
     Returns
     -------
-    ndarray, shape (3, places, n m)
-        Functions, derivatives by u, derivatives by v.
+    ndarray, shape (places, n m)
     """
-    degrees = tuple(len(k) - count - 1 for k, count in zip(knots, weights.shape, strict=True))
-    along_u, rate_u = (basis(knots[0], degrees[0], places[:, 0], k) for k in (0, 1))
-    along_v, rate_v = (basis(knots[1], degrees[1], places[:, 1], k) for k in (0, 1))
-    pairs = ((along_u, along_v), (rate_u, along_v), (along_u, rate_v))
-    weighted, weighted_u, weighted_v = (
-        (np.einsum("pi,pj->pij", u, v) * weights).reshape(-1, weights.size) for u, v in pairs
-    )
+    weighted = _weighted(weights, knots, places, (0, 0))
+    return np.asarray(weighted / weighted.sum(axis=1, keepdims=True))
+
+
+def basis_rates(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
+    """Their first derivatives by u and by v, by the quotient rule; shape (2, places, n m)."""
+    weighted = _weighted(weights, knots, places, (0, 0))
     total = weighted.sum(axis=1, keepdims=True)
-    functions = weighted / total
-    by_u = (weighted_u - weighted_u.sum(axis=1, keepdims=True) * functions) / total
-    by_v = (weighted_v - weighted_v.sum(axis=1, keepdims=True) * functions) / total
-    return np.stack([functions, by_u, by_v])
+    rates = []
+    for orders in ((1, 0), (0, 1)):
+        rate = _weighted(weights, knots, places, orders)
+        rates.append((rate - rate.sum(axis=1, keepdims=True) / total * weighted) / total)
+    return np.stack(rates)
+
+
+def _weighted(weights: Floats, knots: tuple[Floats, Floats], places: Floats, orders: tuple[int, int]) -> Floats:
+    """Products of basis functions, or of derivatives of them, and weights; shape (places, n m)."""
+    along_u, along_v = (
+        basis(knots[k], len(knots[k]) - weights.shape[k] - 1, places[:, k], orders[k]) for k in range(2)
+    )
+    return np.asarray((np.einsum("pi,pj->pij", along_u, along_v) * weights).reshape(-1, weights.size))
 
 
 def images(matrix: Floats, controls: Floats) -> Floats:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+from io import BytesIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +54,24 @@ def write_3mf(vertices: NDArray[np.float32], triangles: NDArray[np.int32], path:
         model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
         writer = model.QueryWriter("3mf")
         writer.SetDecimalPrecision(_DECIMALS)
-        with replacing(path) as temporary:
-            writer.WriteToFile(str(temporary))
+        package = _written(writer)
     except lib3mf.ELib3MFException as problem:
         raise ExportError(f"{path} was not written: lib3mf says {problem}") from problem
+    with replacing(path) as temporary:
+        temporary.write_bytes(package)
+
+
+def _written(writer: Any) -> memoryview:
+    """What a writer of lib3mf writes: into memory, for to a file on a full disk it ends the whole process."""
+    import lib3mf
+
+    package = BytesIO()
+
+    def write(address: int, count: int, _: object) -> None:
+        package.write(ctypes.string_at(address, count))
+
+    def seek(position: int, _: object) -> None:
+        package.seek(position)
+
+    writer.WriteToCallback(lib3mf.WriteCallback(write), lib3mf.SeekCallback(seek), None)
+    return package.getbuffer()

@@ -94,7 +94,7 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
     volume, thickest = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
     laid_off = 0.0
     while True:
-        steps = subdivided(wall, deviation - laid_off)
+        steps = subdivided(wall, deviation, reserved=laid_off)
         thicker, enclosed, part = _of_volume(wall, steps, volume)
         laid_off = abs(part) * thickest
         if steps.deviation + laid_off <= deviation:

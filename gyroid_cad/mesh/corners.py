@@ -91,14 +91,19 @@ class Corners:
         self._edge_forward = self._wall.complex.edge_forward[patches, self._edge_rows % 4]
         self._shifts = self._wall.shifts.astype(np.float32)
         self._fans = self._placed_fans()
+        # By steps: places along edges, and what gives those inside patches.
         self._tables: dict[int, tuple[Integers, Singles]] = {}
+        self._matrices: dict[int, Floats] = {}
 
     def of_faces(self, group: FaceGroup) -> Callable[[Integers], Singles]:
         """From some patches of a group to the corners of both their faces, shape (patches, 2, places, 3)."""
         wall, complex = self._wall, self._wall.complex
         first = sum(group.edge_steps)
-        knots = (wall.knots, wall.knots)
-        matrix = rational_basis(wall.weights, knots, group.template.places[first:])
+        if group.steps not in self._matrices:
+            self._matrices[group.steps] = rational_basis(
+                wall.weights, (wall.knots, wall.knots), group.template.places[first:]
+            )
+        matrix = self._matrices[group.steps]
 
         def inside(patches: Integers) -> Singles:
             controls = wall.nets[wall.patch_net[patches]].reshape(len(patches), 2, -1, 3)
@@ -148,14 +153,16 @@ class Corners:
             self._tables[steps] = self._evaluated_edges(steps)
         rows, table = self._tables[steps]
         where = np.searchsorted(rows, self._edge_rows[edges])
-        placed = table[where]
+        backward = (forward != self._edge_forward[edges]).astype(np.int64)
+        placed: Singles = table[backward, where]
         placed += self._shifts[self._edge_shift[edges]][:, np.newaxis, np.newaxis]
-        backward = forward != self._edge_forward[edges]
-        placed[backward] = placed[backward, :, ::-1]
         return placed
 
     def _evaluated_edges(self, steps: int) -> tuple[Integers, Singles]:
-        """Distinct edges with so many steps, sorted, and the places between their ends as their first patch runs."""
+        """Distinct edges with so many steps, sorted, and the places between their ends.
+
+        Shape of these (2, edges, 2, places, 3): as the first patch of the edge runs and backwards; both faces.
+        """
         rows = np.unique(self._edge_rows[self._triangulation.edge_steps == steps])
         table = np.empty((len(rows), 2, steps - 1, 3))
         functions = basis(self._wall.knots, 3, np.linspace(-1, 1, steps + 1)[1:-1])
@@ -166,7 +173,7 @@ class Corners:
             weighted = functions * edge_row(self._wall.weights, k)
             weighted /= weighted.sum(axis=1, keepdims=True)
             table[some] = np.einsum("pn,ngsc->gspc", weighted, edge_row(nets, k))
-        return rows, table.astype(np.float32)
+        return rows, np.stack([table, table[:, :, ::-1]]).astype(np.float32)
 
     def _placed_fans(self) -> Singles:
         """Corners at fans on both faces, moved into their own patches where fans coincide; shape (fans, 2, 3)."""

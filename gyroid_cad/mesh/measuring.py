@@ -11,7 +11,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.mesh.templates import Template, basis_rates, face_template, images, rational_basis, wall_template
+from gyroid_cad.mesh.templates import (
+    Template,
+    face_template,
+    images,
+    rational_basis,
+    rational_basis_and_rates,
+    wall_template,
+)
 from gyroid_cad.nurbs import edge_row
 from gyroid_cad.wall import Wall
 
@@ -87,8 +94,8 @@ def side_deviations(
     """
     keys, which = _side_cases(wall, free, steps)
     deviations = np.zeros(len(keys))
-    for along, edge, members in _by_edge(keys):
-        weights, rails = _rails(wall, keys[members, 1] // 4, edge)
+    for along, weights, members in _by_weights(wall, keys):
+        rails = _rails(wall, keys[members, 1])
         for chords, rates in _sampled(template(along), weights, (wall.knots, _ACROSS_KNOTS)):
             deviations[members] = np.maximum(deviations[members], _deviations(chords, rates, rails))
     return deviations, which
@@ -110,10 +117,10 @@ def enclosed_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers, acr
     free = np.flatnonzero(wall.complex.free)
     keys, which = _side_cases(wall, free, edge_steps[free])
     sums = np.zeros((len(keys), 4))
-    for along, edge, members in _by_edge(keys):
-        weights, rails = _rails(wall, keys[members, 1] // 4, edge)
+    for along, weights, members in _by_weights(wall, keys):
         template = wall_template(along, across)
-        sums[members] = _sums(template, rational_basis(weights, (wall.knots, _ACROSS_KNOTS), template.places), rails)
+        nodes = rational_basis(weights, (wall.knots, _ACROSS_KNOTS), template.places)
+        sums[members] = _sums(template, nodes, _rails(wall, keys[members, 1]))
     return volume + _shifted(sums[which], shifts[canonical_edges(wall, free)[0]])
 
 
@@ -129,19 +136,25 @@ def _side_cases(wall: Wall, free: Integers, steps: Integers) -> tuple[Integers, 
     return keys, which.ravel()
 
 
-def _by_edge(keys: Integers) -> Iterator[tuple[int, int, Integers]]:
-    """Steps, edge of the patch, and the side walls that have both."""
-    kinds, which = np.unique(np.column_stack([keys[:, 0], keys[:, 1] % 4]), axis=0, return_inverse=True)
-    for number, (along, edge) in enumerate(kinds.tolist()):
-        yield along, edge, np.flatnonzero(which.ravel() == number)
+def _by_weights(wall: Wall, keys: Integers) -> Iterator[tuple[int, Floats, Integers]]:
+    """Steps, weights (n, 2) of the side wall, and the side walls that have both: mostly all edges are alike."""
+    rows = np.stack([edge_row(wall.weights, edge) for edge in range(4)])
+    kinds, kind_of_edge = np.unique(rows, axis=0, return_inverse=True)
+    kind = kind_of_edge.ravel()[keys[:, 1] % 4]
+    for along, number in np.unique(np.column_stack([keys[:, 0], kind]), axis=0).tolist():
+        weights = np.repeat(kinds[number][:, np.newaxis], 2, axis=1)
+        yield along, weights, np.flatnonzero((keys[:, 0] == along) & (kind == number))
 
 
-def _rails(wall: Wall, nets: Integers, edge: int) -> tuple[Floats, Floats]:
-    """Weights (n, 2) and control points (nets, 2 n, 3) of side walls, those of ``Wall.side_wall`` for many nets."""
-    weights = np.repeat(edge_row(wall.weights, edge)[:, np.newaxis], 2, axis=1)
-    # The first two axes are to be those of the patch's grid.
-    row = edge_row(wall.nets[nets].transpose(2, 3, 0, 1, 4), edge)
-    return weights, row.transpose(1, 0, 2, 3).reshape(len(nets), -1, 3)
+def _rails(wall: Wall, rows: Integers) -> Floats:
+    """Control points (rows, 2 n, 3) of side walls, those of ``Wall.side_wall`` for many at once."""
+    count = wall.nets.shape[2]
+    rails = np.empty((len(rows), count, 2, 3))
+    for edge in range(4):
+        some = np.flatnonzero(rows % 4 == edge)
+        # The first two axes are to be those of the patch's grid.
+        rails[some] = edge_row(wall.nets[rows[some] // 4].transpose(2, 3, 0, 1, 4), edge).transpose(1, 0, 2, 3)
+    return rails.reshape(len(rows), 2 * count, 3)
 
 
 def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) -> Iterator[tuple[Floats, Floats]]:
@@ -155,11 +168,16 @@ def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) 
         Derivatives of the surface.
     """
     nodes = rational_basis(weights, knots, template.places)
-    for part in (template.triangles, template.sides):
-        for first in range(0, len(part), _SAMPLES_AT_ONCE):
-            some = part[first : first + _SAMPLES_AT_ONCE]
-            at = template.places[some].mean(axis=1)
-            yield nodes[some].mean(axis=1) - rational_basis(weights, knots, at), basis_rates(weights, knots, at)
+    # Centroids are a third of each of three corners, middles a half of each of two.
+    corners = np.concatenate([template.triangles, template.sides[:, [0, 1, 0]]])
+    shares = np.concatenate(
+        [np.full((len(template.triangles), 3), 1 / 3), np.tile([0.5, 0.5, 0.0], (len(template.sides), 1))]
+    )
+    for first in range(0, len(corners), _SAMPLES_AT_ONCE):
+        some, share = corners[first : first + _SAMPLES_AT_ONCE], shares[first : first + _SAMPLES_AT_ONCE, :, np.newaxis]
+        at, flat = (sum(values[some[:, k]] * share[:, k] for k in range(3)) for values in (template.places, nodes))
+        surface = rational_basis_and_rates(weights, knots, np.asarray(at))
+        yield flat - surface[0], surface[1:]
 
 
 def _deviations(chords: Floats, rates: Floats, controls: Floats) -> Floats:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +23,14 @@ __all__ = ["write_stl"]
 Singles = NDArray[np.float32]
 Integers = NDArray[np.int64]
 
-_RECORD = np.dtype([("normal", "V12"), ("corners", "V36"), ("attributes", "<u2")])
-_CORNER = np.dtype("V12")
+_CORNER, _CORNERS = np.dtype("V12"), np.dtype("V36")
+_RECORD = np.dtype([("normal", _CORNER), ("corners", _CORNERS), ("attributes", "<u2")])
 _HEADER = b"gyroid_cad, millimetres".ljust(80)
 # The count of triangles has 32 bits.
 MOST_TRIANGLES = 2**32 - 1
 # So few that records and corners stay in the processor's cache.
 _TRIANGLES_AT_ONCE = 20_000
+_FLUSHED_BYTES = 16_000_000
 
 
 def write_stl(
@@ -61,71 +61,79 @@ def write_stl(
     if total > MOST_TRIANGLES:
         raise ParameterError("output", str(path), f"at most {MOST_TRIANGLES:,} triangles in STL; these are {total:,}")
     tell(progress, stage, 0, total)
-    with replacing(path) as temporary, temporary.open("wb") as file, ThreadPoolExecutor(1) as writer:
+    with replacing(path) as temporary, temporary.open("wb") as file:
         file.write(_HEADER + np.uint32(total).astype("<u4").tobytes())
-        written, pending = 0, None
+        written = flushed = 0
         for records in _records(triangulation):
-            # The disk takes one portion while the next is made.
-            if pending is not None:
-                pending.result()
-            pending = writer.submit(file.write, records.data)
+            file.write(records.data)
             written += len(records)
+            if (written - flushed) * _RECORD.itemsize > _FLUSHED_BYTES:
+                _start_writing(file.fileno())
+                flushed = written
             tell(progress, stage, written, total)
-        if pending is not None:
-            pending.result()
+
+
+def _start_writing(file: int) -> None:
+    """Let the disk begin with what was written, so that synchronising at the end takes less; where that is possible."""
+    if hasattr(os, "posix_fadvise"):
+        os.posix_fadvise(file, 0, 0, os.POSIX_FADV_DONTNEED)
+
+
+class _Space:
+    """Memory for one portion, used again and again: fresh memory would cost as much time as filling it."""
+
+    def __init__(self) -> None:
+        self._records = np.zeros(0, _RECORD)
+        self._corners = np.empty((0, 9), dtype=np.float32)
+
+    def records(self, count: int) -> NDArray[np.void]:
+        """So many records, with what was left in them."""
+        if len(self._records) < count:
+            self._records = np.zeros(count, _RECORD)
+        return self._records[:count]
+
+    def gathered(self, corners: Singles, triangles: Integers) -> Singles:
+        """The three corners of each triangle of each surface; shape (surfaces triangles, 3, 3)."""
+        places = corners.reshape(len(corners), -1).view(_CORNER)
+        count = len(places) * len(triangles)
+        if len(self._corners) < count:
+            self._corners = np.empty((count, 9), dtype=np.float32)
+        space = self._corners[:count]
+        # Numbers are sound: told so, numpy writes straight into the space.
+        places.take(triangles.ravel(), axis=1, out=space.view(_CORNER).reshape(len(places), -1), mode="clip")
+        return space.reshape(-1, 3, 3)
 
 
 def _records(triangulation: Triangulation) -> Iterator[NDArray[np.void]]:
-    """Records of all triangles in portions; each may be overwritten by the next but one."""
-    corners = Corners(triangulation)
+    """Records of all triangles in portions; each is overwritten by the next."""
+    corners, space = Corners(triangulation), _Space()
     for group in face_groups(triangulation):
-        yield from _of_faces(corners, group)
+        yield from _of_faces(corners, group, space)
     for template, edges in side_groups(triangulation):
         steps = len(template.places) // (triangulation.across + 1) - 1
         for some in _portions(edges, len(template.triangles)):
-            placed = corners.of_side_walls(some, steps)
-            records = np.zeros(len(some) * len(template.triangles), _RECORD)
-            gathered = _gathered(placed, template.triangles)
-            records["normal"] = _normals(gathered).view(_CORNER)[:, 0]
-            records["corners"] = gathered.reshape(-1, 9).view("V36")[:, 0]
-            yield records
+            gathered = space.gathered(corners.of_side_walls(some, steps), template.triangles)
+            yield _filled(space, gathered, _normals(gathered))
 
 
-def _of_faces(corners: Corners, group: FaceGroup) -> Iterator[NDArray[np.void]]:
+def _of_faces(corners: Corners, group: FaceGroup, space: _Space) -> Iterator[NDArray[np.void]]:
     triangles, placed = group.triangles, corners.of_faces(group)
-    # Two in turn: one is filled while the other is written.
-    buffers: list[NDArray[np.void]] = []
-    space = None
     for number, some in enumerate(_portions(group.patches, len(triangles))):
-        space = _gathered(placed(some), triangles, space)
-        gathered = space[: len(some) * len(triangles)]
-        if number < 2:
-            buffers.append(np.zeros(len(gathered), _RECORD))
-            if group.alike:
-                # Translations leave normals as they are: worked out once, they stay in place.
-                once = _normals(gathered[: len(triangles)]).view(_CORNER)[:, 0]
-                buffers[number]["normal"].reshape(len(some), -1)[:] = once
-        records = buffers[number % 2][: len(gathered)]
+        gathered = space.gathered(placed(some), triangles)
         if not group.alike:
-            records["normal"] = _normals(gathered).view(_CORNER)[:, 0]
-        records["corners"] = gathered.reshape(-1, 9).view("V36")[:, 0]
-        yield records
+            yield _filled(space, gathered, _normals(gathered))
+        else:
+            # Translations leave normals as they are: worked out once, they stay in the records.
+            yield _filled(space, gathered, _normals(gathered[: len(triangles)]) if number == 0 else None)
 
 
-def _gathered(corners: Singles, triangles: Integers, space: Singles | None = None) -> Singles:
-    """The three corners of each triangle of each surface, in the first of a space if one is given.
-
-    Returns
-    -------
-    ndarray of float32, shape (surfaces triangles or more, 3, 3)
-    """
-    places = corners.reshape(len(corners), -1).view(_CORNER)
-    if space is None:
-        space = np.empty((places.shape[0] * len(triangles), 3, 3), dtype=np.float32)
-    out = space.reshape(-1, 9)[: len(places) * len(triangles)].view(_CORNER).reshape(len(places), -1)
-    # Numbers are sound: told so, numpy writes straight into the space.
-    places.take(triangles.ravel(), axis=1, out=out, mode="clip")
-    return space
+def _filled(space: _Space, gathered: Singles, normals: Singles | None) -> NDArray[np.void]:
+    """Records of triangles, with normals again and again for every surface, or with those that are there."""
+    records = space.records(len(gathered))
+    if normals is not None:
+        records["normal"].reshape(-1, len(normals))[:] = normals.view(_CORNER)[:, 0]
+    records["corners"] = gathered.reshape(-1, 9).view(_CORNERS)[:, 0]
+    return records
 
 
 def _normals(gathered: Singles) -> Singles:

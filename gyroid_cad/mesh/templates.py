@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import freeze_arrays
 from gyroid_cad.nurbs import basis
 
-__all__ = ["FEWEST_STEPS", "Template", "basis_rates", "face_template", "images", "rational_basis", "wall_template"]
+__all__ = [
+    "FEWEST_STEPS",
+    "Template",
+    "face_template",
+    "images",
+    "rational_basis",
+    "rational_basis_and_rates",
+    "wall_template",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -103,27 +111,32 @@ def rational_basis(weights: Floats, knots: tuple[Floats, Floats], places: Floats
     -------
     ndarray, shape (places, n m)
     """
-    weighted = _weighted(weights, knots, places, (0, 0))
+    along_u, along_v = (_along(weights, knots, places, axis, 0) for axis in (0, 1))
+    weighted = _weighted(along_u, along_v, weights)
     return np.asarray(weighted / weighted.sum(axis=1, keepdims=True))
 
 
-def basis_rates(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
-    """Their first derivatives by u and by v, by the quotient rule; shape (2, places, n m)."""
-    weighted = _weighted(weights, knots, places, (0, 0))
+def rational_basis_and_rates(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
+    """The same and their derivatives by u and by v, by the quotient rule; shape (3, places, n m)."""
+    (u, u_rate), (v, v_rate) = ([_along(weights, knots, places, axis, k) for k in (0, 1)] for axis in (0, 1))
+    weighted = _weighted(u, v, weights)
     total = weighted.sum(axis=1, keepdims=True)
-    rates = []
-    for orders in ((1, 0), (0, 1)):
-        rate = _weighted(weights, knots, places, orders)
-        rates.append((rate - rate.sum(axis=1, keepdims=True) / total * weighted) / total)
-    return np.stack(rates)
+    result = np.empty((3, *weighted.shape))
+    result[0] = weighted / total
+    for k, rate in ((1, _weighted(u_rate, v, weights)), (2, _weighted(u, v_rate, weights))):
+        result[k] = (rate - rate.sum(axis=1, keepdims=True) * result[0]) / total
+    return result
 
 
-def _weighted(weights: Floats, knots: tuple[Floats, Floats], places: Floats, orders: tuple[int, int]) -> Floats:
-    """Products of basis functions, or of derivatives of them, and weights; shape (places, n m)."""
-    along_u, along_v = (
-        basis(knots[k], len(knots[k]) - weights.shape[k] - 1, places[:, k], orders[k]) for k in range(2)
-    )
-    return np.asarray((np.einsum("pi,pj->pij", along_u, along_v) * weights).reshape(-1, weights.size))
+def _along(weights: Floats, knots: tuple[Floats, Floats], places: Floats, axis: int, derivative: int) -> Floats:
+    """Basis functions of one axis, or their derivatives; shape (places, control points along it)."""
+    degree = len(knots[axis]) - weights.shape[axis] - 1
+    return basis(knots[axis], degree, places[:, axis], derivative)
+
+
+def _weighted(along_u: Floats, along_v: Floats, weights: Floats) -> Floats:
+    products = along_u[:, :, np.newaxis] * along_v[:, np.newaxis]
+    return np.asarray((products * weights).reshape(-1, weights.size))
 
 
 def images(matrix: Floats, controls: Floats) -> Floats:

@@ -76,7 +76,9 @@ def side_groups(triangulation: Triangulation) -> Iterator[tuple[Template, Intege
 
 
 class Corners:
-    """Where the corners of a triangulation are, in mm, in single precision.
+    """Where the corners of a triangulation are, in mm, in single precision: x, y, z and a nought.
+
+    For what is gathered of them: sixteen bytes at a time go four times as quick as twelve.
 
     Parameters
     ----------
@@ -89,14 +91,14 @@ class Corners:
         patches, self._edge_rows = canonical_edges(self._wall, np.arange(self._wall.complex.edge_count))
         self._edge_shift = self._wall.patch_shift[patches]
         self._edge_forward = self._wall.complex.edge_forward[patches, self._edge_rows % 4]
-        self._shifts = self._wall.shifts.astype(np.float32)
-        self._fans = self._placed_fans()
+        self._shifts = _four_wide(self._wall.shifts)
+        self._fans = _four_wide(self._placed_fans())
         # By steps: places along edges, and what gives those inside patches.
         self._tables: dict[int, tuple[Integers, Singles]] = {}
         self._matrices: dict[int, Floats] = {}
 
     def of_faces(self, group: FaceGroup) -> Callable[[Integers], Singles]:
-        """From some patches of a group to the corners of both their faces, shape (patches, 2, places, 3)."""
+        """From some patches of a group to the corners of both their faces, shape (patches, 2, places, 4)."""
         wall, complex = self._wall, self._wall.complex
         first = sum(group.edge_steps)
         if group.steps not in self._matrices:
@@ -110,42 +112,42 @@ class Corners:
             # Both faces in one product.
             places = images(matrix, np.moveaxis(controls, 1, 2).reshape(len(patches), -1, 6))
             places = np.moveaxis(places.reshape(len(patches), -1, 2, 3), 2, 1)
-            return places.astype(np.float32).reshape(len(patches), 2, -1)
+            return _four_wide(places).reshape(len(patches), 2, -1)
 
         # Of patches that differ by translations one is evaluated.
         once = inside(group.patches[:1]) if group.alike else None
 
         def placed(patches: Integers) -> Singles:
-            corners = np.empty((len(patches), 2, len(group.template.places), 3), dtype=np.float32)
+            corners = np.empty((len(patches), 2, len(group.template.places), 4), dtype=np.float32)
             corners[:, :, :4] = self._fans[complex.patch_fans[patches]].transpose(0, 2, 1, 3)
             start = 4
             for k, steps in enumerate(group.edge_steps):
                 edges, forward = complex.patch_edges[patches, k], complex.edge_forward[patches, k]
                 corners[:, :, start : start + steps - 1] = self._between(edges, steps, forward)
                 start += steps - 1
-            # Coordinates in one row, for rows of three are slow to add to.
+            # Coordinates in one row, for short rows are slow to add to.
             shifts = np.tile(self._shifts[wall.patch_shift[patches], np.newaxis], len(matrix))
-            rows = corners.reshape(len(patches), 2, -1)[:, :, 3 * first :]
+            rows = corners.reshape(len(patches), 2, -1)[:, :, 4 * first :]
             np.add(inside(patches) if once is None else once, shifts, out=rows)
             return corners
 
         return placed
 
     def of_side_walls(self, edges: Integers, steps: int) -> Singles:
-        """Corners of side walls, along the edge as its patch runs and then across; shape (edges, places, 3)."""
+        """Corners of side walls, along the edge as its patch runs and then across; shape (edges, places, 4)."""
         complex, across = self._wall.complex, self._triangulation.across
         patches, rows = complex.edge_patches[edges, 0], self._edge_rows[edges]
         forward = complex.edge_forward[patches, rows % 4]
-        rails = np.empty((len(edges), 2, steps + 1, 3), dtype=np.float32)
+        rails = np.empty((len(edges), 2, steps + 1, 4), dtype=np.float32)
         for end, k in ((0, rows % 4), (-1, (rows + 1) % 4)):
             rails[:, :, end] = self._fans[complex.patch_fans[patches, k]]
         rails[:, :, 1:-1] = self._between(edges, steps, forward)
         v = np.linspace(0, 1, across + 1)[:, np.newaxis]
-        corners = np.empty((len(edges), steps + 1, across + 1, 3), dtype=np.float32)
+        corners = np.empty((len(edges), steps + 1, across + 1, 4), dtype=np.float32)
         # Two fans' ends of one line through the wall are worked out from the same two places: to the last digit alike.
         below, above = rails[:, 0, :, np.newaxis].astype(float), rails[:, 1, :, np.newaxis].astype(float)
         corners[:] = (1 - v) * below + v * above
-        return corners.reshape(len(edges), -1, 3)
+        return corners.reshape(len(edges), -1, 4)
 
     def _between(self, edges: Integers, steps: int, forward: NDArray[np.bool_]) -> Singles:
         """Corners along edges between their ends, on both faces, as the edge runs or against it."""
@@ -161,7 +163,7 @@ class Corners:
     def _evaluated_edges(self, steps: int) -> tuple[Integers, Singles]:
         """Distinct edges with so many steps, sorted, and the places between their ends.
 
-        Shape of these (2, edges, 2, places, 3): as the first patch of the edge runs and backwards; both faces.
+        Shape of these (2, edges, 2, places, 4): as the first patch of the edge runs and backwards; both faces.
         """
         rows = np.unique(self._edge_rows[self._triangulation.edge_steps == steps])
         table = np.empty((len(rows), 2, steps - 1, 3))
@@ -173,9 +175,9 @@ class Corners:
             weighted = functions * edge_row(self._wall.weights, k)
             weighted /= weighted.sum(axis=1, keepdims=True)
             table[some] = np.einsum("pn,ngsc->gspc", weighted, edge_row(nets, k))
-        return rows, np.stack([table, table[:, :, ::-1]]).astype(np.float32)
+        return rows, _four_wide(np.stack([table, table[:, :, ::-1]]))
 
-    def _placed_fans(self) -> Singles:
+    def _placed_fans(self) -> Floats:
         """Corners at fans on both faces, moved into their own patches where fans coincide; shape (fans, 2, 3)."""
         wall, complex = self._wall, self._wall.complex
         where = np.empty(complex.fan_count, dtype=np.int64)
@@ -194,7 +196,7 @@ class Corners:
             inward = (inward / count - fans.mean(axis=1))[~alone]
             inward *= self._triangulation.parting / np.linalg.norm(inward, axis=1, keepdims=True)
             fans[~alone] += inward[:, np.newaxis]
-        return fans.astype(np.float32)
+        return fans
 
 
 def indexed_triangles(triangulation: Triangulation) -> tuple[Singles, NDArray[np.int32]]:
@@ -213,14 +215,14 @@ def indexed_triangles(triangulation: Triangulation) -> tuple[Singles, NDArray[np
     written = 0
     for group in face_groups(triangulation):
         places = numbers.of_faces(group)
-        vertices[places] = corners.of_faces(group)(group.patches).reshape(*places.shape, 3)
+        vertices[places] = corners.of_faces(group)(group.patches)[..., :3].reshape(*places.shape, 3)
         some = places[:, group.triangles].reshape(-1, 3)
         triangles[written : written + len(some)] = some
         written += len(some)
     for template, edges in side_groups(triangulation):
         steps = len(template.places) // (triangulation.across + 1) - 1
         places = numbers.of_side_walls(edges, steps)
-        vertices[places] = corners.of_side_walls(edges, steps)
+        vertices[places] = corners.of_side_walls(edges, steps)[..., :3]
         some = places[:, template.triangles].reshape(-1, 3)
         triangles[written : written + len(some)] = some
         written += len(some)
@@ -275,6 +277,13 @@ class _Numbers:
         along = np.arange(steps - 1)
         run = np.where(forward[:, np.newaxis], along, steps - 2 - along)
         return np.asarray(self._on_edges[edges, np.newaxis] + run)
+
+
+def _four_wide(places: Floats) -> Singles:
+    """In single precision, with a nought behind."""
+    wide = np.zeros((*places.shape[:-1], 4), dtype=np.float32)
+    wide[..., :3] = places
+    return wide
 
 
 def _starts(counts: Integers) -> Integers:

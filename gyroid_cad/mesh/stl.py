@@ -21,10 +21,22 @@ from gyroid_cad.stages import Progress, tell
 __all__ = ["write_stl"]
 
 Singles = NDArray[np.float32]
+# Four single-precision numbers each, handed about as one.
+Sixteens = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
-_CORNER, _CORNERS = np.dtype("V12"), np.dtype("V36")
-_RECORD = np.dtype([("normal", _CORNER), ("corners", _CORNERS), ("attributes", "<u2")])
+_TWELVE_BYTES, _SIXTEEN_BYTES = np.dtype("V12"), np.dtype(np.complex128)
+_RECORD = np.dtype([("normal", _TWELVE_BYTES), ("corners", "V36"), ("attributes", "<u2")])
+# The same records, for corners of sixteen bytes: what is one too many is overwritten by the next corner.
+_OVERLAPPING = np.dtype(
+    {
+        "names": ["first", "second", "third"],
+        "formats": [_SIXTEEN_BYTES, _SIXTEEN_BYTES, _TWELVE_BYTES],
+        "offsets": [12, 24, 36],
+        "itemsize": _RECORD.itemsize,
+    }
+)
+_FIRST_TWELVE = np.dtype({"names": ["corner"], "formats": [_TWELVE_BYTES], "offsets": [0], "itemsize": 16})
 _HEADER = b"gyroid_cad, millimetres".ljust(80)
 # The count of triangles has 32 bits.
 MOST_TRIANGLES = 2**32 - 1
@@ -84,7 +96,7 @@ class _Space:
 
     def __init__(self) -> None:
         self._records = np.zeros(0, _RECORD)
-        self._corners = np.empty((0, 9), dtype=np.float32)
+        self._corners = np.empty((3, 0), dtype=_SIXTEEN_BYTES)
 
     def records(self, count: int) -> NDArray[np.void]:
         """So many records, with what was left in them."""
@@ -92,16 +104,17 @@ class _Space:
             self._records = np.zeros(count, _RECORD)
         return self._records[:count]
 
-    def gathered(self, corners: Singles, triangles: Integers) -> Singles:
-        """The three corners of each triangle of each surface; shape (surfaces triangles, 3, 3)."""
-        places = corners.reshape(len(corners), -1).view(_CORNER)
+    def gathered(self, corners: Singles, triangles: Integers) -> Sixteens:
+        """First, second and third corners of all triangles of all surfaces; shape (3, surfaces triangles)."""
+        places = corners.reshape(len(corners), -1).view(_SIXTEEN_BYTES)
         count = len(places) * len(triangles)
-        if len(self._corners) < count:
-            self._corners = np.empty((count, 9), dtype=np.float32)
-        space = self._corners[:count]
-        # Numbers are sound: told so, numpy writes straight into the space.
-        places.take(triangles.ravel(), axis=1, out=space.view(_CORNER).reshape(len(places), -1), mode="clip")
-        return space.reshape(-1, 3, 3)
+        if self._corners.shape[1] < count:
+            self._corners = np.empty((3, count), dtype=_SIXTEEN_BYTES)
+        space = self._corners[:, :count]
+        for k in range(3):
+            # Numbers are sound: told so, numpy writes straight into the space.
+            places.take(triangles[:, k], axis=1, out=space[k].reshape(len(places), -1), mode="clip")
+        return space
 
 
 def _records(triangulation: Triangulation) -> Iterator[NDArray[np.void]]:
@@ -117,28 +130,30 @@ def _records(triangulation: Triangulation) -> Iterator[NDArray[np.void]]:
 
 
 def _of_faces(corners: Corners, group: FaceGroup, space: _Space) -> Iterator[NDArray[np.void]]:
-    triangles, placed = group.triangles, corners.of_faces(group)
+    triangles, placed = np.asfortranarray(group.triangles), corners.of_faces(group)
     for number, some in enumerate(_portions(group.patches, len(triangles))):
         gathered = space.gathered(placed(some), triangles)
         if not group.alike:
             yield _filled(space, gathered, _normals(gathered))
         else:
             # Translations leave normals as they are: worked out once, they stay in the records.
-            yield _filled(space, gathered, _normals(gathered[: len(triangles)]) if number == 0 else None)
+            yield _filled(space, gathered, _normals(gathered[:, : len(triangles)]) if number == 0 else None)
 
 
-def _filled(space: _Space, gathered: Singles, normals: Singles | None) -> NDArray[np.void]:
+def _filled(space: _Space, gathered: Sixteens, normals: Singles | None) -> NDArray[np.void]:
     """Records of triangles, with normals again and again for every surface, or with those that are there."""
-    records = space.records(len(gathered))
+    records = space.records(gathered.shape[1])
     if normals is not None:
-        records["normal"].reshape(-1, len(normals))[:] = normals.view(_CORNER)[:, 0]
-    records["corners"] = gathered.reshape(-1, 9).view(_CORNERS)[:, 0]
+        records["normal"].reshape(-1, len(normals))[:] = normals.view(_TWELVE_BYTES)[:, 0]
+    overlapping = records.view(_OVERLAPPING)
+    overlapping["first"], overlapping["second"] = gathered[0], gathered[1]
+    overlapping["third"] = gathered[2].view(_FIRST_TWELVE)["corner"]
     return records
 
 
-def _normals(gathered: Singles) -> Singles:
+def _normals(gathered: Sixteens) -> Singles:
     """Unit normals of triangles, by the right-hand rule; shape (triangles, 3)."""
-    a, b, c = np.ascontiguousarray(gathered.transpose(1, 2, 0))
+    a, b, c = (np.ascontiguousarray(corner.view(np.float32).reshape(-1, 4)[:, :3].T) for corner in gathered)
     b, c = b - a, c - a
     normals = np.stack([b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
     length = np.sqrt(np.sum(normals**2, axis=0))

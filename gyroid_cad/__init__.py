@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.maps import SpaceMap
     from gyroid_cad.nurbs import NurbsSurface
+    from gyroid_cad.triangles import TriangleReport
 
 __all__ = [
     "Bend",
@@ -51,6 +52,7 @@ __all__ = [
     "SoundnessError",
     "SpaceMap",
     "Sphere",
+    "TriangleReport",
     "Twist",
     "__version__",
     "between_planes",
@@ -89,6 +91,7 @@ _HOMES = {
     "lattice": ("Lattice", "LatticeReport"),
     "maps": ("SpaceMap",),
     "nurbs": ("NurbsSurface",),
+    "triangles": ("TriangleReport",),
 }
 
 

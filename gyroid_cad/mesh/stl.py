@@ -53,7 +53,8 @@ def write_stl(
 ) -> None:
     """Write triangles as binary STL, in millimetres.
 
-    Triangles that share an edge have the same coordinates to the last bit.
+    Triangles that share an edge have the same coordinates to the last bit. Single precision rounds them to about 1e-7
+    of the lattice's size, which the deviation does not count.
 
     Parameters
     ----------

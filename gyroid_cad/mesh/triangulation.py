@@ -27,6 +27,8 @@ _PARTING = 1e-3
 _SINGLE_PRECISION_STEPS = 8
 # Of the secant method for the volume: each step squares what is left, and the first leaves 1e-5.
 _SECANT_STEPS = 2
+# A part of the thickness that changes no volume but by rounding.
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,13 +94,15 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
         If a patch would take too many steps, saying which deviation would do.
     """
     volume, thickest = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
-    laid_off = 0.0
+    reserved = 0.0
     while True:
-        steps = subdivided(wall, deviation, reserved=laid_off)
+        steps = subdivided(wall, deviation, reserved)
         thicker, enclosed, part = _of_volume(wall, steps, volume)
         laid_off = abs(part) * thickest
         if steps.deviation + laid_off <= deviation:
             break
+        # What is laid off falls with the rest: never all is reserved for it.
+        reserved = min(laid_off, (deviation + reserved) / 2)
     furthest = float(np.abs(thicker.nets).max() + np.abs(wall.shifts).max())
     parting = max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
     return Triangulation(
@@ -120,7 +124,7 @@ def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, flo
     # Of a thin wall the volume goes with the thickness, which grows on both sides.
     following = (volume / enclosed - 1) / 2
     for _ in range(_SECANT_STEPS):
-        if following == part:
+        if abs(following - part) < _NOTHING:
             break
         thicker = _laid_off(wall, following)
         found = enclosed_volume(thicker, steps.patch_steps, steps.edge_steps, steps.across)

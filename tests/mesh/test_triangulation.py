@@ -53,7 +53,7 @@ def assert_closed(triangulation: Triangulation) -> trimesh.Trimesh:
     euler = 2 * (complex.fan_count - complex.edge_count + complex.patch_count)
     judged = manifold3d.Manifold(manifold3d.Mesh(vertices, triangles.astype(np.uint32)))
     assert judged.status() == manifold3d.Error.NoError
-    assert 2 * complex.component_count - 2 * judged.genus() == euler or complex.component_count > 1
+    assert 2 - 2 * judged.genus() == euler
     by_coordinates = trimesh.Trimesh(vertices, triangles, process=True)
     assert len(by_coordinates.vertices) == len(vertices)
     assert by_coordinates.is_watertight
@@ -112,7 +112,7 @@ def test_whatever_the_lattice_its_triangles_are_closed_and_near(
     assert assert_closed(triangulation).volume == pytest.approx(triangulation.volume, rel=1e-4)
 
 
-def distances_to_wall(wall: Wall, points: Floats, neighbours: int = 8) -> Floats:
+def distances_to_wall(wall: Wall, points: Floats, neighbours: int = 6) -> Floats:
     """From points to the nearest place on faces and side walls: Newton's method from the nearest of many samples."""
     complex = wall.complex
     placed = [(wall.face(int(wall.patch_net[p]), side), int(p)) for p in range(complex.patch_count) for side in SIDES]
@@ -174,7 +174,7 @@ def random_points(triangulation: Triangulation, count: int) -> Floats:
 )
 def test_no_point_of_a_triangle_is_further_from_the_wall_than_asked_for(lattice: Lattice, deviation: float) -> None:
     triangulation = triangulated(lattice.wall(), deviation)
-    distances = distances_to_wall(lattice.wall(), random_points(triangulation, 800))
+    distances = distances_to_wall(lattice.wall(), random_points(triangulation, 600))
     assert np.max(distances) <= triangulation.deviation <= deviation
     # Nor are there more triangles than it takes: somewhere they are about as far off as they may be.
     assert np.max(distances) > deviation / 3

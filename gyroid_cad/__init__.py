@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from gyroid_cad.mesh.volumes import VolumePatches
     from gyroid_cad.meshing import mesh_quality
     from gyroid_cad.nurbs import NurbsSurface
+    from gyroid_cad.triangles import TriangleReport
 
 __all__ = [
     "Bend",
@@ -58,6 +59,7 @@ __all__ = [
     "SoundnessError",
     "SpaceMap",
     "Sphere",
+    "TriangleReport",
     "Twist",
     "VolumePatches",
     "__version__",
@@ -107,6 +109,7 @@ _HOMES = {
     "mesh.volumes": ("VolumePatches",),
     "meshing": ("mesh_quality",),
     "nurbs": ("NurbsSurface",),
+    "triangles": ("TriangleReport",),
 }
 
 

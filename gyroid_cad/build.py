@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,8 +13,8 @@ import numpy as np
 
 from gyroid_cad.box_cut import Box, cut_to_box
 from gyroid_cad.covering import PHASES
-from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.files import require_writable
+from gyroid_cad.errors import KernelError
+from gyroid_cad.formats import FORMATS, require_meshing, require_schema
 from gyroid_cad.laying import LaidWall, Recipe, laid_wall
 from gyroid_cad.memory import require_memory
 from gyroid_cad.stages import Progress, tell, timed
@@ -24,15 +23,11 @@ if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = [
-    "FORMATS",
     "Build",
     "build",
-    "require_formats",
     "require_settings",
     "write_shape",
 ]
-
-FORMATS = {".step": "step", ".stp": "step", ".brep": "brep", ".stl": "stl"}
 
 # Peak memory a cell, as benchmarks/memory.py measures it, rounded up.
 _SOLID_BYTES_PER_CELL = 1_500_000
@@ -182,15 +177,18 @@ def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, a
     """
     from gyroid_cad.kernel.brep import write_brep
     from gyroid_cad.kernel.step import write_step
-    from gyroid_cad.kernel.stl import write_stl
+    from gyroid_cad.kernel.stl import meshed, write_stl
+    from gyroid_cad.mesh.three_mf import write_3mf
 
     match FORMATS[path.suffix.lower()]:
         case "step":
             write_step(shape, path, schema, parameter_curves=cut)
         case "brep":
             write_brep(shape, path)
-        case _:
+        case "stl":
             write_stl(shape, path, deviation, angle)
+        case _:
+            write_3mf(*meshed(shape, path, deviation, angle), path)
 
 
 _builds: OrderedDict[Recipe, Build] = OrderedDict()
@@ -224,35 +222,25 @@ def build(recipe: Recipe, progress: Progress | None = None) -> Build:
     return _builds[recipe]
 
 
-def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """Check the endings and folders of files to be written, before anything is built.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not paths:
-        raise ParameterError("output", [], "at least one file name")
-    targets = []
-    for path in paths:
-        if Path(path).suffix.lower() not in FORMATS:
-            raise ParameterError("output", str(path), f"a file name ending in {', '.join(FORMATS)}")
-        targets.append(require_writable(path))
-    if len({target.resolve() for target in targets}) < len(targets):
-        raise ParameterError("output", [str(path) for path in paths], "each file once")
-    return targets
-
-
-def require_settings(cells: tuple[int, int, int], schema: str, deviation: float | None, angle: float) -> None:
+def require_settings(
+    cells: tuple[int, int, int], schema: str, deviation: float | None, angle: float, solid: bool = True
+) -> None:
     """Check the settings of files to be written, and that memory will do, before anything is built.
 
+    Parameters
+    ----------
+    cells : tuple of int
+    schema : str
+    deviation : float, optional
+    angle : float
+    solid : bool
+        Whether there is a solid to be written; triangles of a wall are streamed.
+
     Raises
     ------
     ParameterError
     """
-    from gyroid_cad.kernel.step import require_schema
-    from gyroid_cad.kernel.stl import require_meshing
-
     require_schema(schema)
     require_meshing(1.0 if deviation is None else deviation, angle)
-    require_memory(cells, _FILE_BYTES_PER_CELL)
+    if solid:
+        require_memory(cells, _FILE_BYTES_PER_CELL)

@@ -15,11 +15,12 @@ from gyroid_cad.cli_fill import fill_command
 from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name, printed_options
 from gyroid_cad.cli_mesh import mesh_command, volumes_command
 from gyroid_cad.errors import GyroidError, ParameterError
-from gyroid_cad.tables import print_summary, print_table, shown_progress
+from gyroid_cad.tables import print_summary, print_table, print_triangles, shown_progress
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
     from gyroid_cad.lattice import LatticeReport
+    from gyroid_cad.triangles import TriangleReport
 
 __all__ = ["main"]
 
@@ -34,7 +35,13 @@ def commands() -> None:
 
 
 @commands.command()
-@click.option("-o", "--output", multiple=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated.")
+@click.option(
+    "-o",
+    "--output",
+    multiple=True,
+    metavar="FILE",
+    help=".step, .stp, .brep, .stl or .3mf; may be repeated. For .stl and .3mf of whole patches no solid is built.",
+)
 @lattice_options
 @click.option(
     "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
@@ -43,14 +50,21 @@ def commands() -> None:
     "--deviation",
     type=float,
     metavar="MM",
-    help="Of STL facets; a thousandth of the cell size if left out, or a tenth of a thin wall.",
+    help="Of the triangles in .stl and .3mf; a thousandth of the cell size if left out, or a tenth of a thin wall.",
 )
-@click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between STL facets.")
+@click.option(
+    "--angle",
+    type=float,
+    default=15.0,
+    show_default=True,
+    metavar="DEGREES",
+    help="Between triangles of a lattice cut with --trim; those of whole patches keep to the deviation alone.",
+)
 @click.option("--print-config", is_flag=True, help="Print the lattice as TOML, ready for LATTICE.toml; build nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 @click.option("--quiet", is_flag=True, help="Print no table and no progress.")
 def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
-    """Build a lattice as a closed solid and write it.
+    """Build a lattice as a closed solid, or as triangles, and write it.
 
     Expressions are of x, y and z in mm, of places in the lattice before anything is moved; pi and functions
     such as sqrt, sin, exp and minimum are known. A TOML file has these options as keys, with underscores;
@@ -58,6 +72,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
 
     \b
     gyroid-cad build -o part.step -o part.stl --cells 2 2 2 --cell-size 10 --thickness 0.8
+    gyroid-cad build -o print.stl -o print.3mf --cells 8 8 8 --cell-size 5 --density 0.2 --deviation 0.02
     gyroid-cad build -o part.step --cells 3 3 1 --cell-size 10 --thickness "0.6 + 0.04*x"
     gyroid-cad build -o block.step --cells 5 5 5 --cell-size 7 --density 0.3 --trim box
     gyroid-cad build -o ring.step --cells 12 2 1 --cell-size 10 --density 0.2 --map cylinder:radius=20,angle=360
@@ -74,12 +89,16 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     settings = {name: given[name] for name in ("schema", "deviation", "angle")}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
-        report = lattice.report(progress)
+        report: LatticeReport | TriangleReport
+        if lattice.needs_solid(outputs):
+            report = lattice.report(progress)
+        else:
+            report = lattice.triangle_report(given["deviation"], progress)
     summary = _summary(report, outputs, time.perf_counter() - start)
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_summary(summary)
+        (print_triangles if "triangles" in summary else print_summary)(summary)
 
 
 commands.add_command(fill_command)
@@ -163,7 +182,7 @@ def _with_option_name(problem: ParameterError) -> str:
     return str(problem).replace(problem.parameter, option_name(problem.parameter), 1)
 
 
-def _summary(report: LatticeReport, outputs: Sequence[str], total: float) -> dict[str, Any]:
+def _summary(report: LatticeReport | TriangleReport, outputs: Sequence[str], total: float) -> dict[str, Any]:
     from pathlib import Path
 
     summary = asdict(report)

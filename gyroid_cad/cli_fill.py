@@ -18,7 +18,12 @@ __all__ = ["fill_command"]
 @click.command("fill")
 @click.argument("part", metavar="PART.step")
 @click.option(
-    "-o", "--output", multiple=True, required=True, metavar="FILE", help=".step, .stp, .brep or .stl; may be repeated."
+    "-o",
+    "--output",
+    multiple=True,
+    required=True,
+    metavar="FILE",
+    help=".step, .stp, .brep, .stl or .3mf; may be repeated.",
 )
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(
@@ -55,8 +60,8 @@ __all__ = ["fill_command"]
 @click.option(
     "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
 )
-@click.option("--deviation", type=float, metavar="MM", help="Of STL facets.")
-@click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between STL facets.")
+@click.option("--deviation", type=float, metavar="MM", help="Of the triangles in .stl and .3mf.")
+@click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between triangles.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 @click.option("--quiet", is_flag=True, help="Print no table and no progress.")
 def fill_command(
@@ -79,9 +84,10 @@ def fill_command(
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
     """
     start = time.perf_counter()
-    from gyroid_cad.build import require_formats, require_settings
+    from gyroid_cad.build import require_settings
     from gyroid_cad.filling import fill
     from gyroid_cad.fit import FitSettings
+    from gyroid_cad.formats import require_formats
 
     require_formats(output)
     require_settings((1, 1, 1), schema, deviation, angle)

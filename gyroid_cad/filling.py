@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.build import require_formats, require_settings, write_shape
+from gyroid_cad.build import require_settings, write_shape
 from gyroid_cad.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.covering import Frame
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields import FieldLike
 from gyroid_cad.filled_part import Filling, Outcome
 from gyroid_cad.fit import FitSettings
+from gyroid_cad.formats import FORMATS, TRIANGLE_FORMATS, require_formats
 from gyroid_cad.infill import Infill, block_infill, endless_infill
 from gyroid_cad.lattice import USUAL_TOLERANCE, Lattice
 from gyroid_cad.limits import require_cell_size, sound_tolerance
@@ -141,7 +142,7 @@ class Filled:
         limit = usual if deviation is None else finite_number("deviation", deviation)
         require_settings((1, 1, 1), schema, limit, angle)
         for path in targets:
-            if not self.report.closed and path.suffix.lower() == ".stl":
+            if not self.report.closed and FORMATS[path.suffix.lower()] in TRIANGLE_FORMATS:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
         for path in targets:
             write_shape(self.solid(), path, schema, limit, angle, cut=True)

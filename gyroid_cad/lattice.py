@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import prod
+from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
 from gyroid_cad.block_maps import as_map, space_over
-from gyroid_cad.build import Build, build, require_formats, require_settings
+from gyroid_cad.build import Build, build, require_settings
 from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
 from gyroid_cad.fields import Field, FieldLike, as_field
 from gyroid_cad.fit import FitSettings, fit_within
+from gyroid_cad.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
 from gyroid_cad.grading import Grading
 from gyroid_cad.laying import LaidWall, Recipe, laid_wall
 from gyroid_cad.limits import (
@@ -36,7 +38,8 @@ from gyroid_cad.mesh.volumes import VolumePatches
 from gyroid_cad.meshing import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
 from gyroid_cad.paper import paper_units
 from gyroid_cad.report import LatticeReport, report_of
-from gyroid_cad.stages import Progress
+from gyroid_cad.stages import Progress, timed
+from gyroid_cad.triangles import TriangleReport, Triangles, triangle_report, triangles
 from gyroid_cad.tube import density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
@@ -261,9 +264,11 @@ class Lattice:
         angle: float = 15.0,
         progress: Progress | None = None,
     ) -> None:
-        """Write the solid; each path's ending chooses STEP (.step, .stp), BREP (.brep) or STL (.stl).
+        """Write files; each path's ending chooses STEP (.step, .stp), BREP (.brep), STL (.stl) or 3MF (.3mf).
 
-        Every path and setting is checked before anything is built. A file appears whole or not at all.
+        Every path and setting is checked before anything is built. A file appears whole or not at all. STL and 3MF
+        of whole patches are made straight from the NURBS faces: unless STEP or BREP is asked for as well, no solid is
+        built and no kernel loaded. STL is streamed; 3MF is in memory as a whole while it is written.
 
         Parameters
         ----------
@@ -271,10 +276,11 @@ class Lattice:
         schema : {"ap214", "ap242"}
             Of STEP files.
         deviation : float, optional
-            Of STL facets from the surface, in mm; if left out, a thousandth of the cell size, or a tenth of the
-            wall if that is less.
+            Of the triangles in STL and 3MF from the faces, in mm; if left out, a thousandth of the cell size, or a
+            tenth of the wall if that is less.
         angle : float
-            Between neighbouring STL facets, in degrees.
+            Between neighbouring triangles, in degrees: of a trimmed lattice, whose solid the kernel meshes. Triangles
+            of whole patches are as large as the deviation lets them be.
         progress : callable, optional
             Called with (stage, done, total).
 
@@ -283,11 +289,56 @@ class Lattice:
         ParameterError, FitError, KernelError, ExportError
         """
         targets = require_formats(paths)
-        limit = None if deviation is None else finite_number("deviation", deviation, _LENGTH)
-        require_settings(self.cells, schema, limit, angle)
-        built = self.built(progress)
-        usual = min(self.cell_size / 1000, built.laid.thinnest / 10)
-        built.write(targets, schema, usual if limit is None else limit, angle, progress)
+        if deviation is not None:
+            deviation = finite_number("deviation", deviation, _LENGTH)
+        solid = [path for path in targets if self.needs_solid([path])]
+        flat = [path for path in targets if path not in solid]
+        require_settings(self.cells, schema, deviation, angle, solid=bool(solid))
+        if solid:
+            built = self.built(progress)
+            built.write(solid, schema, self._deviation(deviation), angle, progress)
+        if flat:
+            self.triangles(deviation, progress).write(flat, progress)
+
+    def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
+        """Whether the solid must be built for files with these endings: not for triangles of whole patches."""
+        formats = {FORMATS[Path(path).suffix.lower()] for path in paths}
+        return bool(self.trim) or not formats <= set(TRIANGLE_FORMATS)
+
+    def triangles(self, deviation: float | None = None, progress: Progress | None = None) -> Triangles:
+        """The triangles behind STL and 3MF files of whole patches; no kernel is asked.
+
+        Parameters
+        ----------
+        deviation : float, optional
+            As of :meth:`write`.
+        progress : callable, optional
+            Called with (stage, done, total).
+
+        Raises
+        ------
+        ParameterError
+            If the lattice is trimmed, or a patch would take too many triangles.
+        FitError
+            If the fit's edges do not meet those of its neighbours.
+        """
+        if self.trim:
+            raise ParameterError(
+                "trim", self.trim, "none: triangles of a trimmed lattice are the kernel's, of its solid"
+            )
+        if deviation is not None:
+            deviation = finite_number("deviation", deviation, _LENGTH)
+            require_meshing(deviation)
+        # The wall first, so that its progress is told.
+        self.laid(progress)
+        return triangles(self._recipe(), self._deviation(deviation), progress)
+
+    def triangle_report(self, deviation: float | None = None, progress: Progress | None = None) -> TriangleReport:
+        """Make the triangles if they aren't yet, and say what they are; nothing is written."""
+        made = self.triangles(deviation, progress)
+        with timed(made.seconds, "report", progress):
+            measures = (self.wall_thickness, self.volume_fraction, self.exact_volume)
+        return triangle_report(made, *measures)
 
     def hexahedra(self, subdivisions: int, layers: int = 1, order: int = 1, full: bool = False) -> Mesh:
         """The wall as structured hexahedra that share their nodes; no kernel is asked.
@@ -349,6 +400,10 @@ class Lattice:
     def laid(self, progress: Progress | None = None) -> LaidWall:
         """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""
         return laid_wall(self._recipe(), progress)
+
+    def _deviation(self, given: float | None) -> float:
+        """Of triangles, in mm; the usual one if none is given."""
+        return min(self.cell_size / 1000, self.laid().thinnest / 10) if given is None else given
 
     def _recipe(self) -> Recipe:
         settings = self.fit

@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 
 # Peak memory a cell of control nets and of all that is sampled to fit and check them, rounded up.
 _BYTES_PER_CELL = 500_000
+# Of whole cells that are all alike: they have their nets in common, only the complex grows; writing STL included.
+_BYTES_PER_ALIKE_CELL = 40_000
 _SHIFTS = float(np.abs(PHASES).max())
 _REMEMBERED = 2
 
@@ -114,7 +116,12 @@ def lay_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
     FitError
         If the fit's edges do not meet those of its neighbours.
     """
-    require_memory(recipe.cells, _BYTES_PER_CELL, recipe.settings.control_points)
+    alike = recipe.grading.uniform and not recipe.boxed
+    require_memory(
+        recipe.cells,
+        _BYTES_PER_ALIKE_CELL if alike else _BYTES_PER_CELL,
+        10 if alike else recipe.settings.control_points,
+    )
     seconds: dict[str, float] = {}
     with timed(seconds, "complex", progress):
         complex = _complex(recipe)

@@ -7,7 +7,15 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-__all__ = ["print_fill", "print_mesh", "print_summary", "print_table", "print_volumes", "shown_progress"]
+__all__ = [
+    "print_fill",
+    "print_mesh",
+    "print_summary",
+    "print_table",
+    "print_triangles",
+    "print_volumes",
+    "shown_progress",
+]
 
 Progress = Callable[[str, int, int], None]
 
@@ -34,6 +42,31 @@ def print_summary(summary: dict[str, Any]) -> None:
         ("volume", f"{summary['volume']:.8g} mm3{error}"),
         ("deviation", _deviation(summary)),
         *([("checked", _checks(summary["samples_per_patch"]))] if summary["samples_per_patch"] else []),
+        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
+        ("time", f"{summary['seconds']['total']:.2f} s"),
+    ]
+    print_table(None, rows)
+
+
+def print_triangles(summary: dict[str, Any]) -> None:
+    """Print a lattice's report as triangles, its files and the time it took.
+
+    Parameters
+    ----------
+    summary : dict
+        The report's values, with ``files`` and ``seconds["total"]``.
+    """
+    nx, ny, nz = summary["cells"]
+    fewest, most = summary["fewest_steps"], summary["most_steps"]
+    squares = f"{most} x {most}" if fewest == most else f"{fewest} x {fewest} to {most} x {most}"
+    error = summary["volume"] / summary["volume_exact"] - 1
+    rows = [
+        ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
+        ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
+        ("triangles", f"{summary['triangles']:,} (closed), {squares} squares a patch and face"),
+        ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
+        ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
+        ("deviation", f"{summary['deviation']:.2g} mm from the NURBS faces"),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
         ("time", f"{summary['seconds']['total']:.2f} s"),
     ]

@@ -15,11 +15,12 @@ import gyroid_cad.kernel.check
 import gyroid_cad.kernel.solid
 from gyroid_cad import build as build_module
 from gyroid_cad import laying, memory
-from gyroid_cad.build import FORMATS, Build, Progress, require_formats, require_settings
+from gyroid_cad.build import Build, Progress, require_settings
 from gyroid_cad.errors import FitError, KernelError, ParameterError
 from gyroid_cad.field_makers import linear
 from gyroid_cad.fields import Field
 from gyroid_cad.fit import FitSettings
+from gyroid_cad.formats import FORMATS, require_formats
 from gyroid_cad.grading import Grading
 from gyroid_cad.kernel.check import Topology, enclosed_volume, topology
 from gyroid_cad.laying import Recipe

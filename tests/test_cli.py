@@ -138,12 +138,40 @@ def test_quiet_prints_nothing_but_writes_the_file(capsys: Captured, tmp_path: Pa
 def test_options_reach_the_file(capsys: Captured, tmp_path: Path) -> None:
     outputs = ["-o", tmp_path / "a.step", "-o", tmp_path / "a.stl"]
     sizes = []
-    for settings in (["--deviation", "0.5", "--angle", "40"], ["--deviation", "0.5", "--angle", "10"]):
-        run = in_process(capsys, "build", *outputs, *ONE_CELL, *WALL, *COARSE, "--schema", "ap242", *settings)
+    for deviation in ("0.5", "0.05"):
+        settings = ["--schema", "ap242", "--deviation", deviation]
+        run = in_process(capsys, "build", *outputs, *ONE_CELL, *WALL, *COARSE, *settings)
         assert run.status == 0
         sizes.append((tmp_path / "a.stl").stat().st_size)
     assert sizes[0] < sizes[1]
     assert "AP242" in (tmp_path / "a.step").read_text()[:1000]
+
+
+def test_the_angle_reaches_the_kernels_triangles_of_a_trimmed_lattice(capsys: Captured, tmp_path: Path) -> None:
+    sizes = []
+    for angle in ("40", "10"):
+        settings = ["--trim", "box", "--deviation", "0.5", "--angle", angle]
+        assert in_process(capsys, "build", "-o", tmp_path / "a.stl", *ONE_CELL, *WALL, *COARSE, *settings).status == 0
+        sizes.append((tmp_path / "a.stl").stat().st_size)
+    assert sizes[0] < sizes[1]
+
+
+def test_files_of_triangles_alone_are_reported_as_triangles(capsys: Captured, tmp_path: Path) -> None:
+    outputs = ["-o", tmp_path / "a.stl", "-o", tmp_path / "b.3mf"]
+    settings = [*ONE_CELL, *WALL, *COARSE, "--deviation", "0.1"]
+    summary = json.loads(in_process(capsys, "build", *outputs, *settings, "--json").out)
+    report = Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(5)).triangle_report(0.1).as_dict()
+    assert list(summary) == [*report, "files"]
+    for key in set(report) - {"seconds", "cells"}:
+        assert summary[key] == report[key]
+    assert set(summary["seconds"]) >= {"triangles", "write a.stl", "write b.3mf", "total"}
+    assert summary["files"] == [
+        {"path": str(tmp_path / name), "bytes": (tmp_path / name).stat().st_size} for name in ("a.stl", "b.3mf")
+    ]
+    assert summary["files"][0]["bytes"] == 84 + 50 * summary["triangles"]
+    lines = in_process(capsys, "build", *outputs, *settings).out.splitlines()
+    assert any(line.startswith("triangles") and f"{summary['triangles']:,} (closed)" in line for line in lines)
+    assert any(str(tmp_path / "b.3mf") in line for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -168,8 +196,9 @@ def test_options_reach_the_file(capsys: Captured, tmp_path: Path) -> None:
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--fit", "rough"], ["--fit", "rough"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--schema", "ap203"], ["--schema", "ap203"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "0"], ["--deviation = 0.0"]),
+        (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "1e-7"], ["--deviation = 1e-07", "mm or more"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--angle", "90"], ["--angle = 90.0"]),
-        (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl"]),
+        (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl, .3mf"]),
         (["build", "-o", "a.step", "-o", "./a.step", *ONE_CELL, *WALL], ["-o = ", "each file once"]),
         (["build", "-o", "missing/a.step", *ONE_CELL, *WALL], ["-o = 'missing/a.step'", "existing folder"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--colour", "red"], ["--colour"]),

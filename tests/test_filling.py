@@ -165,6 +165,8 @@ def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: c
     assert is_valid(read_step(tmp_path / "surface.step"))
     with pytest.raises(ParameterError, match="the bare surface bounds no volume"):
         surface.write(tmp_path / "surface.stl")
+    with pytest.raises(ParameterError, match="the bare surface bounds no volume"):
+        surface.write(tmp_path / "surface.3mf")
 
 
 def test_a_field_that_does_not_vary_is_a_number() -> None:
@@ -226,12 +228,12 @@ def test_channels_within_a_skin_are_those_of_the_core() -> None:
 
 
 def test_files_are_written_and_read_back(tmp_path: Path) -> None:
-    filled().write(tmp_path / "light.step", tmp_path / "light.stl", deviation=0.1)
+    filled().write(*(tmp_path / f"light.{ending}" for ending in ("step", "stl", "3mf")), deviation=0.1)
     shape = read_step(tmp_path / "light.step")
     assert is_valid(shape)
     assert topology(shape).closed
     assert measure(shape)[0] == pytest.approx(filled().report.volume, rel=1e-5)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["light.step", "light.stl"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["light.3mf", "light.step", "light.stl"]
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,13 @@ from dataclasses import FrozenInstanceError, asdict
 from fractions import Fraction
 from math import inf, nan
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from OCP.Bnd import Bnd_Box
@@ -196,7 +199,7 @@ def test_the_deviation_is_a_length_and_scales_with_the_cell() -> None:
 
 
 def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> None:
-    names = ["part.step", "part.brep", "part.stl"]
+    names = ["part.step", "part.brep", "part.stl", "part.3mf"]
     cell.write(*(tmp_path / name for name in names), schema="ap242", deviation=0.1)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert enclosed_volume(read_step(tmp_path / "part.step")) == pytest.approx(cell.wall().volume(), rel=1e-8)
@@ -212,6 +215,7 @@ def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> Non
         (["good.stl"], {"deviation": 0}, "a length above 0 mm"),
         (["good.stl"], {"deviation": "fine"}, NUMBER_WORDS),
         (["good.stl"], {"deviation": nan}, NUMBER_WORDS),
+        (["good.3mf"], {"deviation": -1}, "a length above 0 mm"),
         (["good.stl"], {"angle": 90}, "below 90 degrees"),
         (["good.stl"], {"angle": nan}, "below 90 degrees"),
         (["good.stl"], {"angle": "steep"}, "below 90 degrees"),
@@ -220,12 +224,69 @@ def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> Non
 def test_what_cannot_be_written_is_refused_before_anything_is_built(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: list[str], settings: dict[str, Any], words: str
 ) -> None:
-    monkeypatch.setattr("gyroid_cad.lattice.build", lambda *_: pytest.fail("it was built"))
+    for function in ("build", "triangles"):
+        monkeypatch.setattr(f"gyroid_cad.lattice.{function}", lambda *_: pytest.fail("it was built"))
     with pytest.raises(ParameterError) as caught:
         Lattice(**GOOD).write(*(tmp_path / name for name in names), **settings)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_solid_is_built_only_where_a_file_needs_it(
+    cell: Lattice, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gyroid_cad.lattice.build", lambda *_: pytest.fail("it was built"))
+    cell.write(tmp_path / "part.stl", tmp_path / "part.3mf", deviation=0.1)
+    assert {path.name for path in tmp_path.iterdir()} == {"part.stl", "part.3mf"}
+    assert not cell.needs_solid(["a.stl", "b.3MF"])
+    assert cell.needs_solid(["a.stl", "b.step"])
+    assert Lattice(**GOOD, trim="box").needs_solid(["a.stl"])
+
+
+def test_the_triangle_report_agrees_with_the_file_and_with_the_solid(cell: Lattice, tmp_path: Path) -> None:
+    cell.write(tmp_path / "part.stl", deviation=0.05)
+    report, solid = cell.triangle_report(0.05), cell.report()
+    mesh = trimesh.load_mesh(tmp_path / "part.stl")
+    assert len(mesh.faces) == report.triangles
+    assert mesh.volume == pytest.approx(report.volume, rel=1e-5)
+    assert report.volume == pytest.approx(report.volume_wall, rel=1e-5)
+    assert 0 < report.laid_off < report.deviation <= 0.05
+    assert report.volume_wall == pytest.approx(solid.volume, rel=1e-9)
+    for key in ("cells", "cell_size", "thickness", "density", "patches", "free_edges", "pinch_lines", "volume_exact"):
+        assert getattr(report, key) == getattr(solid, key)
+    assert report.as_dict() == asdict(report)
+
+
+def test_left_out_the_deviation_is_a_thousandth_of_the_cell_or_a_tenth_of_a_thin_wall() -> None:
+    for thickness, usual in ((0.8, 0.01), (0.05, 0.005)):
+        lattice = Lattice((1, 1, 1), 10.0, thickness, fit=COARSE)
+        assert lattice.triangles() is lattice.triangles(usual)
+        assert usual / 2 < lattice.triangle_report().deviation <= usual
+
+
+def test_triangles_of_the_same_lattice_and_deviation_are_made_once() -> None:
+    lattice = Lattice((1, 1, 1), 10.0, 0.8, fit=COARSE)
+    assert lattice.triangles(0.1) is Lattice((1, 1, 1), 10.0, 0.8, fit=COARSE).triangles(0.1)
+    assert lattice.triangles(0.2) is not lattice.triangles(0.1)
+
+
+def test_a_trimmed_lattice_has_no_triangles_but_the_kernels() -> None:
+    with pytest.raises(ParameterError, match=r"trim = 'box': .* the kernel's"):
+        Lattice(**GOOD, trim="box").triangles()
+
+
+def test_triangles_are_streamed_where_memory_would_not_do_for_the_solid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=402_000_000))
+    lattice = Lattice((1, 1, 1), 10.0, 0.801, fit=COARSE)
+    lattice.write(tmp_path / "part.stl", deviation=0.1)
+    with pytest.raises(ParameterError, match="GB are free"):
+        lattice.write(tmp_path / "part.step")
+    with pytest.raises(ParameterError, match="GB are free"):
+        lattice.write(tmp_path / "part.3mf", deviation=0.001)
+    assert [path.name for path in tmp_path.iterdir()] == ["part.stl"]
 
 
 def test_a_folder_that_may_not_be_written_to_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from types import MappingProxyType
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
@@ -18,26 +17,13 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Wr
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.errors import ExportError, ParameterError
+from gyroid_cad.errors import ExportError
 from gyroid_cad.files import replacing
+from gyroid_cad.formats import require_schema
 from gyroid_cad.kernel.step_text import compact_step
 from gyroid_cad.version import __version__
 
-__all__ = ["SCHEMAS", "read_step", "require_schema", "write_step"]
-
-SCHEMAS = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
-
-
-def require_schema(schema: str) -> str:
-    """The kernel's name of a schema.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if schema not in tuple(SCHEMAS):
-        raise ParameterError("schema", schema, " or ".join(SCHEMAS))
-    return SCHEMAS[schema]
+__all__ = ["read_step", "write_step"]
 
 
 def write_step(

@@ -1,10 +1,11 @@
-"""Triangles of a solid by the kernel's mesher, as binary STL."""
+"""Triangles of a solid by the kernel's mesher, as binary STL or as arrays."""
 
 from __future__ import annotations
 
 import os
-from math import isfinite, radians
-from numbers import Real
+from math import radians
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,33 +21,21 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 
-from gyroid_cad.errors import ExportError, ParameterError
+from gyroid_cad.errors import ExportError
 from gyroid_cad.files import replacing
+from gyroid_cad.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.kernel.solid import TOLERANCE
 
-__all__ = ["DEFAULT_ANGLE", "require_meshing", "write_stl"]
+__all__ = ["meshed", "write_stl"]
 
-# Degrees between neighbouring facets.
-DEFAULT_ANGLE = 15.0
 # How far triangles that touch without belonging together are parted: a thousandth of the deviation, but
 # enough for the single-precision numbers of STL to tell them apart.
 _PARTING = 1e-3
 _SINGLE_PRECISION_STEPS = 8
+_HEADER_BYTES = 84
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 
 Floats = NDArray[np.float64]
-
-
-def require_meshing(deviation: float, angle: float) -> None:
-    """Check the mesher's two limits.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not (isinstance(deviation, Real) and isfinite(deviation) and deviation > 0):
-        raise ParameterError("deviation", deviation, "a length above 0 mm")
-    if not (isinstance(angle, Real) and isfinite(angle) and 0 < angle < 90):
-        raise ParameterError("angle", angle, "above 0 and below 90 degrees")
 
 
 def write_stl(
@@ -71,17 +60,58 @@ def write_stl(
     ------
     ParameterError, ExportError
     """
+    copy = _meshed_copy(shape, path, deviation, angle)
+    with replacing(path) as temporary:
+        _write(copy, temporary, path)
+
+
+def meshed(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The same triangles as arrays, for other formats.
+
+    They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
+    Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
+
+    Returns
+    -------
+    vertices : ndarray of float32, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int32, shape (triangles, 3)
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    copy = _meshed_copy(shape, path, deviation, angle)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "triangles.stl"
+        _write(copy, file, path)
+        records = np.fromfile(file, _RECORD, offset=_HEADER_BYTES)
+    # Minus nought is nought.
+    corners: NDArray[np.float32] = records["corners"].reshape(-1, 3) + np.float32(0)
+    vertices, numbers = np.unique(corners, axis=0, return_inverse=True)
+    triangles = numbers.reshape(-1, 3).astype(np.int32)
+    # What single precision makes of slivers bounds nothing.
+    slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
+    return vertices, triangles[~slivers]
+
+
+def _meshed_copy(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float) -> TopoDS_Shape:
     require_meshing(deviation, angle)
     copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
     mesher = BRepMesh_IncrementalMesh(copy, deviation, False, radians(angle), True)
     if not mesher.IsDone():
         raise ExportError(f"{path} was not written: the kernel's mesher failed")
     _part_touching_vertices(copy, deviation)
+    return copy
+
+
+def _write(meshed_shape: TopoDS_Shape, file: Path, path: str | os.PathLike[str]) -> None:
     writer = StlAPI_Writer()
     writer.ASCIIMode = False
-    with replacing(path) as temporary:
-        if not writer.Write(copy, str(temporary)):
-            raise ExportError(f"{path} was not written: the kernel's STL writer failed")
+    if not writer.Write(meshed_shape, str(file)):
+        raise ExportError(f"{path} was not written: the kernel's STL writer failed")
 
 
 def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
@@ -99,7 +129,6 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     )
     touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
     for vertex in touching.tolist():
-        # A face used by two edges at the vertex is listed twice.
         # A face used by two edges at the vertex is listed twice.
         faces = {face.__hash__(): TopoDS.Face_s(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
         meshes = [_placed_mesh(face) for face in faces.values()]

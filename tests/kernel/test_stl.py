@@ -19,8 +19,10 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.fit import FitSettings
+from gyroid_cad.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.kernel.check import enclosed_volume
-from gyroid_cad.kernel.stl import DEFAULT_ANGLE, require_meshing, write_stl
+from gyroid_cad.kernel.stl import meshed as triangles_of
+from gyroid_cad.kernel.stl import write_stl
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.wall import SIDES
 
@@ -124,6 +126,19 @@ def test_the_mesh_fills_the_lattices_bounding_box(fine_cell: Lattice, tmp_path: 
     assert np.all(mesh.bounds[0] >= low - single_precision)
     assert np.all(mesh.bounds[1] <= high + single_precision)
     np.testing.assert_allclose(mesh.bounds, [low, high], atol=deviation)
+
+
+def test_the_triangles_as_arrays_are_those_of_the_file_with_their_corners_numbered(
+    fine_cell: Lattice, tmp_path: Path
+) -> None:
+    file = meshed(fine_cell, tmp_path, 0.1)
+    vertices, triangles = triangles_of(fine_cell.solid(), tmp_path / "part.3mf", 0.1)
+    arrays = trimesh.Trimesh(vertices, triangles, process=False)
+    assert len(np.unique(vertices, axis=0)) == len(vertices)
+    assert arrays.is_watertight
+    assert arrays.is_winding_consistent
+    assert len(triangles) == len(file.faces)
+    assert arrays.volume == pytest.approx(file.volume, rel=1e-6)
 
 
 def test_meshing_leaves_the_solid_without_triangles(fine_cell: Lattice, tmp_path: Path) -> None:

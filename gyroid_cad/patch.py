@@ -9,10 +9,11 @@ k + 1, and (u, v) to (-v, u).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from math import pi, sqrt
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,7 +43,13 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-Parameterisation = Callable[[ArrayLike, ArrayLike, Family], tuple[Floats, Floats]]
+
+
+class Parameterisation(Protocol):
+    """Points and normals of the patch at (u, v)."""
+
+    def __call__(self, u: ArrayLike, v: ArrayLike, family: Family = ...) -> tuple[Floats, Floats]: ...
+
 
 # From the Weierstrass frame to the cell's axes: T_yz R_z(-45 deg) of eq. (6).
 _TO_CELL_AXES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, -sqrt(2)]]) / sqrt(2)

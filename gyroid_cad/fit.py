@@ -141,7 +141,8 @@ def fit_report(fitted: FittedPatch) -> FitReport:
             break
     sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
     curvature = fitted.surface.mean_curvature(samples[:, np.newaxis], samples[np.newaxis]) * _CELL_SIZE
-    off_corners = fitted.surface.evaluate(*parameter_corners().T) - exact(*parameter_corners().T, fitted.family)[0]
+    corner_u, corner_v = parameter_corners().T
+    off_corners = fitted.surface.evaluate(corner_u, corner_v) - exact(corner_u, corner_v, fitted.family)[0]
     return FitReport(
         max_distance=float(np.max(np.abs(distance))) / _CELL_SIZE,
         rms_distance=float(np.sqrt(np.mean(distance**2))) / _CELL_SIZE,

@@ -70,7 +70,7 @@ def test_from_the_shell_a_surface_becomes_a_step_file_that_reads_back_valid_and_
     assert enclosed_volume(shape) == pytest.approx(300, rel=1e-6)
     mesh = trimesh.load_mesh(stl)
     assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(300, rel=2e-3)
+    assert mesh.volume == pytest.approx(300, rel=4e-3)
 
 
 @NAMES

@@ -14,10 +14,11 @@ import numpy as np
 
 from benchmarks.subject import CELL_SIZE, THICKNESS, block, block_solid, kernel_volume
 from benchmarks.timing import Row, plain_table, print_verdicts
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitReport, FitSettings, FittedPatch, fit_patch, fit_report
 from gyroid_cad.nurbs import gauss_points
-from gyroid_cad.symmetry import cubic_cell
-from gyroid_cad.tube import AREA_PER_CELL, density_of_thickness
+
+TUBE = USUAL.tube
 
 __all__ = ["main"]
 
@@ -82,7 +83,7 @@ def _report(control_points: int) -> FitReport:
 
 
 def _cell_rows() -> list[Row]:
-    exact = density_of_thickness(THICKNESS / CELL_SIZE) * CELL_SIZE**3
+    exact = TUBE.density(THICKNESS / CELL_SIZE) * CELL_SIZE**3
     volume, area = block(1).volume(), _area_per_cell(fit_patch())
     by_kernel = kernel_volume(block_solid(1))
     return [
@@ -96,9 +97,9 @@ def _cell_rows() -> list[Row]:
         Row("the same by the kernel's BRepGProp", abs(by_kernel / exact - 1), remark=f"{by_kernel:.7f} mm³"),
         Row(
             "area of the mid-surface of a cell, relative error",
-            abs(area / AREA_PER_CELL - 1),
+            abs(area / TUBE.area - 1),
             2e-7,
-            remark=f"{area:.8f}, exactly {AREA_PER_CELL:.8f} L²",
+            remark=f"{area:.8f}, exactly {TUBE.area:.8f} L²",
         ),
     ]
 
@@ -109,7 +110,7 @@ def _area_per_cell(patch: FittedPatch) -> float:
     u, v = (grid.ravel() for grid in np.meshgrid(points, points, indexing="ij"))
     d = patch.surface.derivatives(u, v)
     stretch = np.linalg.norm(np.cross(d[1, 0], d[0, 1]), axis=1)
-    return len(cubic_cell()) * float(np.outer(weights, weights).ravel() @ stretch) / 4
+    return len(USUAL.cell) * float(np.outer(weights, weights).ravel() @ stretch) / 4
 
 
 if __name__ == "__main__":

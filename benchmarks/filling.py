@@ -33,12 +33,14 @@ from benchmarks.timing import Row, best_in_turn, fresh_python, plain_table, prin
 from gyroid_cad.complex import build_complex
 from gyroid_cad.covering import Frame, covering_complex, nearest_offsets
 from gyroid_cad.exact_wall import patch_points_and_normals
+from gyroid_cad.families import USUAL
 from gyroid_cad.filling import fill
 from gyroid_cad.fit import fit_patch
 from gyroid_cad.kernel.solid import realise
 from gyroid_cad.kernel.step import read_step, write_step
-from gyroid_cad.tube import density_of_thickness, thickness_of_density
 from gyroid_cad.wall import build_wall
+
+TUBE = USUAL.tube
 
 __all__ = ["main"]
 
@@ -68,7 +70,7 @@ def _one_period() -> list[Row]:
     (ours, made), (theirs, common) = best_in_turn(
         2, lambda: fill(box, CELL_SIZE, THICKNESS), lambda: BRepAlgoAPI_Common(shell, box).Shape()
     )
-    exact = density_of_thickness(THICKNESS / CELL_SIZE) * CELL_SIZE**3
+    exact = TUBE.density(THICKNESS / CELL_SIZE) * CELL_SIZE**3
     return [
         Row("one period: simple offset, cut / ours", theirs / ours, 5, unit="x", at_least=True),
         Row("  ours: volume off the tube formula", abs(made.report.volume / exact - 1), 1e-4),
@@ -105,7 +107,7 @@ def _run_alone(what: str) -> None:
     if what == "boolean":
         from gyroid_cad.kernel.check import topology
 
-        thickness = float(thickness_of_density(DENSITY)) * SIZE
+        thickness = float(TUBE.thickness(DENSITY)) * SIZE
         lattice = realise(build_wall(build_complex((cells + 1,) * 3), fit_patch(), SIZE, thickness))
         start = time.process_time()
         shape = BRepAlgoAPI_Common(lattice, box).Shape()
@@ -134,7 +136,7 @@ def _free_forms(quick: bool) -> list[Row]:
 
 def _against_columns(name: str, part: TopoDS_Shape) -> list[Row]:
     report = fill(part, SIZE, density=DENSITY).report
-    thickness = float(thickness_of_density(DENSITY)) * SIZE
+    thickness = float(TUBE.thickness(DENSITY)) * SIZE
     expected = _volume_by_columns(part, thickness)
     remark = f"{report.faces} faces, {report.solids} solids, {sum(report.seconds.values()):.0f} s"
     return [

@@ -1,8 +1,8 @@
-"""How the two interior shifts of the smooth parameterisation move the fit's deviation.
+"""How the two interior shifts of the smooth parameterisation move the fit's deviation, surface by surface.
 
-The edges are given; where the interior lies between them is free, and ``patch.py`` shifts it by two small
-coefficients. This scans both round the chosen values, and shows plain transfinite interpolation (no shift)
-beside, for the 10 x 10 fit.
+The edges are given; where the interior lies between them is free, and each family shifts it by two small
+coefficients of its own. This scans both round the chosen values, in parts of the patch's size, and shows plain
+transfinite interpolation (no shift) beside, for the 10 x 10 fit.
 
 Run: ``python -m benchmarks.parameterisation [--steps N] [--width W]``
 """
@@ -11,36 +11,43 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from benchmarks.timing import Row, plain_table, print_verdicts
-from gyroid_cad import patch
-from gyroid_cad.fit import FitReport, fit_patch, fit_report
+from gyroid_cad.families import SURFACES
+from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
+from gyroid_cad.weierstrass import Family
 
 __all__ = ["main"]
 
 Shifts = tuple[float, float]
 
 # How far from the best of the scan the chosen values may be.
-_NEAR_THE_BEST = 1.02
+_NEAR_THE_BEST = 1.05
 
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether the chosen values are near the best of the scan."""
     options = _parsed(arguments)
-    radial, cubic = chosen = (patch._RADIAL_SHIFT, patch._CUBIC_SHIFT)
     around = options.width * np.linspace(-1, 1, 2 * options.steps + 1)
-    reports = {(radial + dr, cubic + dc): _report((radial + dr, cubic + dc)) for dr in around for dc in around}
-    plain = _report((0.0, 0.0))
+    results = [_scanned(surface.family, around) for surface in SURFACES.values()]
+    return all(results)
+
+
+def _scanned(family: Family, around: np.ndarray) -> bool:
+    reports = {(dr, dc): _report(family, (dr, dc)) for dr in around.tolist() for dc in around.tolist()}
+    plain = fit_report(fit_patch(FitSettings(), replace(family, interior_shift=(0.0, 0.0))))
     _print_scan(
-        "Deviation / L over the radial (down) and cubic (across) shift", reports, lambda r: f"{r.max_distance:.2e}"
+        f"{family.name}: deviation / L over changes of the radial (down) and cubic (across) shift",
+        reports,
+        lambda r: f"{r.max_distance:.2e}",
     )
-    _print_scan("Angle between normals, degrees", reports, lambda r: f"{r.max_normal_angle:.4f}")
     best = min(reports, key=lambda shifts: reports[shifts].max_distance)
-    return print_verdicts("Shifts of the interior", _rows(reports[chosen], plain, best, reports[best]))
+    rows = _rows(reports[0.0, 0.0], plain, best, reports[best])
+    return print_verdicts(f"Shifts of the interior, {family.name}", rows)
 
 
 def _rows(chosen: FitReport, plain: FitReport, best: Shifts, at_best: FitReport) -> list[Row]:
@@ -48,7 +55,7 @@ def _rows(chosen: FitReport, plain: FitReport, best: Shifts, at_best: FitReport)
     return [
         Row("deviation / L as chosen", chosen.max_distance, remark=f"angle {chosen.max_normal_angle:.4f}°"),
         Row("deviation / L without shifts", plain.max_distance, remark=f"angle {plain.max_normal_angle:.4f}°"),
-        Row("deviation / L, best of the scan", at_best.max_distance, remark=f"at {best[0]:.4f}, {best[1]:.4f}"),
+        Row("deviation / L, best of the scan", at_best.max_distance, remark=f"at {best[0]:+.4f}, {best[1]:+.4f}"),
         Row("as chosen / best of the scan", ratio, _NEAR_THE_BEST, unit="x"),
     ]
 
@@ -56,30 +63,15 @@ def _rows(chosen: FitReport, plain: FitReport, best: Shifts, at_best: FitReport)
 def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Scan the interior shifts of the parameterisation.")
     parser.add_argument("--steps", type=int, default=2, help="to each side of the chosen values (default 2)")
-    parser.add_argument("--width", type=float, default=2e-3, help="of the scan to each side (default 0.002)")
+    parser.add_argument("--width", type=float, default=4e-3, help="of the scan to each side (default 0.004)")
     return parser.parse_args(arguments)
 
 
-def _report(shifts: Shifts) -> FitReport:
-    with _shifted(*shifts):
-        return fit_report(fit_patch())
-
-
-@contextmanager
-def _shifted(radial: float, cubic: float) -> Iterator[None]:
-    """Set the two coefficients; put them back, and forget the fits made with them."""
-    before = (patch._RADIAL_SHIFT, patch._CUBIC_SHIFT)
-    _set_shifts(radial, cubic)
-    try:
-        yield
-    finally:
-        _set_shifts(*before)
-
-
-def _set_shifts(radial: float, cubic: float) -> None:
-    patch._RADIAL_SHIFT, patch._CUBIC_SHIFT = radial, cubic
-    fit_patch.cache_clear()
-    fit_report.cache_clear()
+def _report(family: Family, changes: Shifts) -> FitReport:
+    radial, cubic = family.interior_shift
+    # The surface's symmetry leaves the cubic one a direction in the complex plane.
+    shifted = (radial + changes[0], cubic + changes[1] * cubic / abs(cubic))
+    return fit_report(fit_patch(FitSettings(), replace(family, interior_shift=shifted)))
 
 
 def _print_scan(title: str, reports: dict[Shifts, FitReport], shown: Callable[[FitReport], str]) -> None:

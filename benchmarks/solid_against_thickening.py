@@ -30,13 +30,15 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from benchmarks.subject import CELL_SIZE, THICKNESS, block_solid, kernel_volume, sewn, translation
 from benchmarks.timing import Row, best_in_turn, plain_table, print_verdicts
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import fit_patch
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.step import write_step
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.symmetry import QUARTER, cubic_cell
-from gyroid_cad.tube import density_of_thickness
+from gyroid_cad.symmetry import QUARTER
+
+TUBE = USUAL.tube
 
 __all__ = ["copies", "main", "thickened"]
 
@@ -81,7 +83,7 @@ def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
 def _figures(seconds: float, shape: TopoDS_Shape, cells: int) -> tuple[str, str, str, str, str]:
     counts = topology(shape)
     # The simple offset hands back an inverted solid at times: the sign is not held against it.
-    exact = density_of_thickness(THICKNESS / CELL_SIZE) * (cells * CELL_SIZE) ** 3
+    exact = TUBE.density(THICKNESS / CELL_SIZE) * (cells * CELL_SIZE) ** 3
     error = abs(kernel_volume(shape)) / exact - 1
     valid = "yes" if is_valid(shape) else "no"
     return f"{seconds:.2f} s", f"{counts.faces}", f"{counts.open_edges}", valid, f"{error:+.1e}"
@@ -90,7 +92,7 @@ def _figures(seconds: float, shape: TopoDS_Shape, cells: int) -> tuple[str, str,
 def copies(cells: int) -> list[TopoDS_Face]:
     """The block's patches, half a wall below the mid-surface."""
     bases = {side: _patch_face(-side * THICKNESS / 2) for side in (-1, 1)}
-    placements = cubic_cell()
+    placements = USUAL.cell
     translations = placements.translations * QUARTER * CELL_SIZE / 2
     isometries = np.concatenate([placements.matrices, translations[..., np.newaxis]], axis=-1)
     cell = []

@@ -15,6 +15,7 @@ from build123d import Align, BasePartObject, BuildPart, Compound, Location, Mode
 from build123d.geometry import to_align_offset
 
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fields import FieldLike
 from gyroid_cad.filling import fill
 from gyroid_cad.fit import FitSettings
@@ -26,11 +27,11 @@ __all__ = ["Gyroid", "GyroidFill"]
 class Gyroid(BasePartObject):  # type: ignore[misc]
     """Part Object: Gyroid
 
-    A gyroid lattice, aligned by its bounding box.
+    A lattice of the gyroid, or of another surface, aligned by its bounding box.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
@@ -60,9 +61,10 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         map: MapLike | None = None,
         tolerance: float | None = None,
         trim: str | None = None,
+        surface: str = USUAL.name,
     ) -> None:
         self.lattice = Lattice(
-            cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim
+            cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim, surface
         )
         part = Part.cast(self.lattice.solid())
         if align is not None:
@@ -86,7 +88,7 @@ class GyroidFill(Part):  # type: ignore[misc]
     mode : Mode
         In a builder, the filled part takes the place of what is there.
     **settings
-        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, material_density, tolerance, lattice.
+        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, material_density, tolerance, lattice, surface.
 
     Attributes
     ----------

@@ -25,6 +25,13 @@ __all__ = ["fill_command"]
     metavar="FILE",
     help=".step, .stp, .brep, .stl or .3mf; may be repeated.",
 )
+@click.option(
+    "--surface",
+    type=click.Choice(["gyroid", "diamond", "primitive"]),
+    default="gyroid",
+    show_default=True,
+    help="Of the lattice.",
+)
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(
     "--thickness",

@@ -50,6 +50,13 @@ _OPTIONS = (
         is_eager=True,
         callback=_defaults_from_file,
     ),
+    click.option(
+        "--surface",
+        type=click.Choice(["gyroid", "diamond", "primitive"]),
+        default="gyroid",
+        show_default=True,
+        help="Of the lattice.",
+    ),
     click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z."),
     click.option(
         "--cell-size", type=float, metavar="MM", help="Period of the cubic cell, before it is scaled or mapped."
@@ -139,12 +146,12 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
                 + ", ".join(map(option_name, mixed or (*_OWN_OPTIONS, "cell_size", "map", "trim")))
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
-        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"])
+        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
     if given["cell_size"] is None:
         raise click.UsageError("Missing option '--cell-size'.")
     if (given["thickness"] is None) == (given["density"] is None):
         raise click.UsageError("give exactly one of --thickness and --density")
-    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
+    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim", "surface")}
     return Lattice(given["cells"], given["cell_size"], **own, fit=fit)
 
 

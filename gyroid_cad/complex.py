@@ -1,7 +1,7 @@
 """The lattice's cell complex: which patches exist and which edges and corners they share, by integer id.
 
-Corners are told apart by their integer coordinates, edges by the two corners they join; no distance is
-ever compared. Where the lattice's border leaves only some of the six patches at a corner, those that hang
+Corners are told apart by their integer coordinates, edges by the two corners they join and the way between them; no
+distance is ever compared. Where the lattice's border leaves only some of the six patches at a corner, those that hang
 together by edges form a fan. Two fans at one corner would touch in a line through the wall only; each
 has vertices of its own, so that the wall's surface stays a two-manifold.
 """
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.arrays import freeze_arrays
-from gyroid_cad.symmetry import CELL_QUARTERS, Placements, cubic_cell, placed_corners
+from gyroid_cad.families import USUAL
+from gyroid_cad.symmetry import CELL_QUARTERS, Placements, placed_corners
 
 __all__ = ["CellComplex", "build_complex", "connected"]
 
@@ -121,7 +122,7 @@ def build_complex(
     cells : tuple of int
         Number of cells along x, y, z.
     placements : Placements, optional
-        The patches of one cell; the paper's arrangement if left out.
+        The patches of one cell; those of the usual surface if left out.
     closed : tuple of bool
         Along which axes the last cells join the first ones, as round a cylinder: a corner at the far end is the
         same as that at the near end.
@@ -134,7 +135,7 @@ def build_complex(
     -------
     CellComplex
     """
-    placements = cubic_cell() if placements is None else placements
+    placements = USUAL.cell if placements is None else placements
     grid = np.stack(np.meshgrid(*map(np.arange, cells), indexing="ij"), axis=-1).reshape(-1, 3)
     patch_placement = np.tile(np.arange(len(placements)), len(grid))
     patch_cell = np.repeat(grid + np.array(first), len(placements), axis=0)
@@ -143,14 +144,19 @@ def build_complex(
         patch_placement, patch_cell = patch_placement[kept], patch_cell[kept]
     quarters = placed_corners(placements)[patch_placement] + CELL_QUARTERS * patch_cell[:, np.newaxis]
 
+    along = np.roll(quarters, -1, axis=1) - quarters
     for axis in np.flatnonzero(closed):
         quarters[..., axis] %= CELL_QUARTERS * cells[axis]
     corner_quarters, patch_corners = _numbered_corners(quarters)
     following = np.roll(patch_corners, -1, axis=1)
-    ends = np.stack([np.minimum(patch_corners, following), np.maximum(patch_corners, following)], axis=-1)
-    keys, flat_edges = np.unique(ends[..., 0] * len(corner_quarters) + ends[..., 1], return_inverse=True)
-    patch_edges = flat_edges.reshape(-1, 4)
     edge_forward = patch_corners < following
+    ends = np.stack([np.minimum(patch_corners, following), np.maximum(patch_corners, following)], axis=-1)
+    # Round a ring of one cell two edges may join the same corners, one each way.
+    way = np.where(edge_forward[..., np.newaxis], along, -along) + CELL_QUARTERS
+    number = (ends[..., 0] * len(corner_quarters) + ends[..., 1]) * (2 * CELL_QUARTERS + 1) ** 3
+    number += way @ ((2 * CELL_QUARTERS + 1) ** np.arange(3))
+    keys, flat_edges = np.unique(number, return_inverse=True)
+    patch_edges = flat_edges.reshape(-1, 4)
     edge_patches = _patches_of_edges(patch_edges, len(keys))
 
     patch_fans, fan_corner = _fans(patch_corners, patch_edges, edge_forward, edge_patches)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gyroid_cad.complex import CellComplex, build_complex, connected
 from gyroid_cad.exact_wall import laid_patches, patch_points, patch_points_and_normals
+from gyroid_cad.families import USUAL, MinimalSurface
 from gyroid_cad.grading import Grading
-from gyroid_cad.symmetry import CELL_QUARTERS, cubic_cell
-from gyroid_cad.tube import LARGEST_THICKNESS
+from gyroid_cad.symmetry import CELL_QUARTERS, Placements
 
 __all__ = [
     "AT_HOME",
@@ -39,8 +39,6 @@ Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 OUTSIDE, CROSSING, INSIDE = -1, 0, 1
-# From the middle of a patch to its corners, in quarters of the bounding-cell length: (2, 0, 1).
-_PATCH_RADIUS = np.sqrt(5) / CELL_QUARTERS
 # Along each side of a patch, whose middle is among them.
 SIDE_SAMPLES = 7
 # Of the lattice, in cell sizes: tangent or nearly coincident faces cannot be cut; a shift that no symmetry knows parts
@@ -75,7 +73,9 @@ class Frame:
 AT_HOME = Frame(np.zeros(3), np.eye(3))
 
 
-def covering_complex(low: Floats, high: Floats, frame: Frame, cell_size: float, reach: float) -> CellComplex:
+def covering_complex(
+    low: Floats, high: Floats, frame: Frame, cell_size: float, reach: float, surface: MinimalSurface = USUAL
+) -> CellComplex:
     """All patches that come within reach of a box in the part's space.
 
     Parameters
@@ -87,13 +87,14 @@ def covering_complex(low: Floats, high: Floats, frame: Frame, cell_size: float, 
         In mm.
     reach : float
         Half the wall or whatever else stands off the mid-surface, in mm.
+    surface : MinimalSurface
     """
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     own = frame.own(corners)
-    margin = reach + _PATCH_RADIUS * cell_size
+    placements = surface.cell
+    margin = reach + _patch_radius(placements) * cell_size
     first = np.floor((own.min(axis=0) - margin) / cell_size).astype(np.int64) - 1
     last = np.ceil((own.max(axis=0) + margin) / cell_size).astype(np.int64) + 1
-    placements = cubic_cell()
     centres = placements.translations / CELL_QUARTERS * cell_size
 
     def near(placement: Integers, cell: Integers) -> Booleans:
@@ -105,11 +106,17 @@ def covering_complex(low: Floats, high: Floats, frame: Frame, cell_size: float, 
     return build_complex((nx, ny, nz), placements, first=(x, y, z), wanted=near)
 
 
+def _patch_radius(placements: Placements) -> float:
+    """From the middle of a patch to its corners, which are furthest from it, in cell sizes."""
+    return float(np.linalg.norm(placements.patch.corner_array, axis=1).max()) / CELL_QUARTERS
+
+
 def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> tuple[float, float]:
     """The thinnest and the thickest wall of patches that may come near a box in the part's space, in mm."""
     if grading.uniform:
         return float(grading.thickness), float(grading.thickness)  # type: ignore[arg-type]
-    complex = covering_complex(low, high, frame, grading.cell_size, LARGEST_THICKNESS / 2 * grading.cell_size)
+    reach = grading.surface.tube.largest_thickness / 2 * grading.cell_size
+    complex = covering_complex(low, high, frame, grading.cell_size, reach, grading.surface)
     walls = [laid.thickness for _, laid in laid_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES))]
     return min(float(some.min()) for some in walls), max(float(some.max()) for some in walls)
 
@@ -178,7 +185,7 @@ def sides_of_points(
     return sides
 
 
-def periodic_offsets(frame: Frame, cell_size: float, points: Floats) -> Floats:
+def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: MinimalSurface = USUAL) -> Floats:
     """How far points of the part's space lie from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
 
     Parameters
@@ -187,13 +194,14 @@ def periodic_offsets(frame: Frame, cell_size: float, points: Floats) -> Floats:
     cell_size : float
         In mm.
     points : ndarray, shape (n, 3)
+    surface : MinimalSurface
 
     Returns
     -------
     ndarray, shape (n,)
         In mm; positive on the side that the common normal points to.
     """
-    cell = covering_complex(np.zeros(3), np.full(3, cell_size), AT_HOME, cell_size, 0.0)
+    cell = covering_complex(np.zeros(3), np.full(3, cell_size), AT_HOME, cell_size, 0.0, surface)
     places, normals = patch_points_and_normals(cell, cell_size, np.linspace(-1, 1, _OFFSET_SAMPLES))
     own = np.mod(frame.own(points), cell_size)
     return nearest_offsets(places, normals, own)[0]

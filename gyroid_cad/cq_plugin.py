@@ -13,6 +13,7 @@ from typing import Any
 import cadquery as cq
 
 from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fields import FieldLike
 from gyroid_cad.filling import fill
 from gyroid_cad.fit import FitSettings
@@ -36,12 +37,13 @@ def gyroid(
     map: MapLike | None = None,
     tolerance: float | None = None,
     trim: str | None = None,
+    surface: str = USUAL.name,
 ) -> cq.Workplane:
-    """A gyroid lattice at each point of the stack.
+    """A lattice of the gyroid, or of another surface, at each point of the stack.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -60,7 +62,9 @@ def gyroid(
     ------
     ParameterError, FitError, KernelError
     """
-    lattice = Lattice(cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim)
+    lattice = Lattice(
+        cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim, surface
+    )
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
     if len(per_axis) != 3:
@@ -90,7 +94,7 @@ def gyroid_fill(
     cell_size, thickness, density, kind, skin
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates.
     **settings
-        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, openings, tolerance, lattice.
+        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, openings, tolerance, lattice, surface.
 
     Returns
     -------

@@ -13,6 +13,7 @@ from gyroid_cad.complex import CellComplex
 from gyroid_cad.grading import Grading, Laid
 from gyroid_cad.patch import PARAMETERISATIONS
 from gyroid_cad.symmetry import QUARTER
+from gyroid_cad.weierstrass import Family
 
 __all__ = [
     "ExactMeasures",
@@ -88,17 +89,17 @@ def sampled_place(
 
 def _placed_grid(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
     """Points in mm and unit normals of the first cell's patches; shape (placements, m * m, 3) each."""
-    points, normals = _exact_grid(tuple(samples.tolist()))
     placements = complex.placements
+    points, normals = _exact_grid(tuple(samples.tolist()), placements.patch.family)
     turns = np.swapaxes(placements.matrices, 1, 2).astype(float)
     places = points @ turns + (placements.translations * QUARTER)[:, np.newaxis]
     return places * (cell_size / 2), normals @ (turns * placements.sides[:, np.newaxis, np.newaxis])
 
 
 @lru_cache(maxsize=16)
-def _exact_grid(samples: tuple[float, ...]) -> tuple[Floats, Floats]:
+def _exact_grid(samples: tuple[float, ...], family: Family) -> tuple[Floats, Floats]:
     along = np.array(samples)
-    points, normals = PARAMETERISATIONS["smooth"](along[:, np.newaxis], along[np.newaxis])
+    points, normals = PARAMETERISATIONS["smooth"](along[:, np.newaxis], along[np.newaxis], family)
     return points.reshape(-1, 3), normals.reshape(-1, 3)
 
 

@@ -15,6 +15,7 @@ from gyroid_cad.build import require_settings, write_shape
 from gyroid_cad.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.covering import Frame
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.families import USUAL, MinimalSurface, surface_named
 from gyroid_cad.fields import FieldLike
 from gyroid_cad.filled_part import Filling, Outcome
 from gyroid_cad.fit import FitSettings
@@ -165,8 +166,9 @@ def fill(
     openings: Sequence[Any] = (),
     tolerance: float | None = None,
     lattice: Lattice | None = None,
+    surface: str = USUAL.name,
 ) -> Filled:
-    """Fill a part with gyroid: what is left is one exact B-rep, closed and valid.
+    """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
     Parameters
     ----------
@@ -199,7 +201,8 @@ def fill(
         Largest deviation in cell sizes of a wall that varies; 1e-4 if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness and density are its own.
+        size, thickness, density and surface are its own.
+    surface : {"gyroid", "diamond", "primitive"}
 
     Returns
     -------
@@ -220,7 +223,10 @@ def fill(
     if shell is not None and kind == SURFACE:
         raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
     closeness = USUAL_TOLERANCE if tolerance is None else sound_tolerance(tolerance)
-    regions, size, infill_in = _described(kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice)
+    chosen = surface_named(surface)
+    regions, size, infill_in = _described(
+        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
+    )
     whole = part_of(part)
     hollow = None if shell is None else _hollowed(whole, shell, openings)
     core = whole if hollow is None else hollow.core
@@ -240,6 +246,7 @@ def _described(
     fit: FitSettings,
     tolerance: float,
     lattice: Lattice | None,
+    surface: MinimalSurface,
 ) -> tuple[tuple[Region, ...], float, _InfillIn]:
     """The regions wanted, the cell size, and how the lattice is to be had for a part and a frame."""
     if lattice is not None:
@@ -249,14 +256,14 @@ def _described(
                 raise ParameterError(name, value, "none beside a lattice, which has its own")
         if kind != SHEET:
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
-        regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None)
+        regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
         return regions.regions, lattice.cell_size, lambda part, frame, timed: block_infill(lattice, frame)
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
-    wanted = regions_of(kind, size, thickness, density)
+    wanted = regions_of(kind, size, thickness, density, surface.tube)
 
     def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
-        made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed)
+        made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.thickest:
             raise ParameterError("thickness", made.thickest, f"less than the part's smallest extent, {smallest:.6g} mm")

@@ -9,7 +9,7 @@ the edge, so two patches that meet there get the same ones.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,12 @@ from gyroid_cad.fit_settings import DEGREE, MOST_CONTROL_POINTS, FitSettings, mo
 from gyroid_cad.nurbs import NurbsSurface, basis, edge_row, gauss_points
 from gyroid_cad.patch import (
     EDGE_HALF_TURN,
-    EDGE_HALF_TURN_SHIFT,
     PARAMETERISATIONS,
     ROTOINVERSION,
+    edge_half_turn_shift,
     parameter_corners,
 )
+from gyroid_cad.weierstrass import GYROID, Family
 
 __all__ = [
     "FitReport",
@@ -60,6 +61,7 @@ class FittedPatch:
     Attributes
     ----------
     settings : FitSettings
+    family : Family
     surface : NurbsSurface
         In units of the bounding-cell length, centred at the origin.
     normals : NurbsSurface
@@ -67,6 +69,7 @@ class FittedPatch:
     """
 
     settings: FitSettings
+    family: Family
     surface: NurbsSurface
     normals: NurbsSurface
 
@@ -94,22 +97,23 @@ class FitReport:
 
 
 @lru_cache(maxsize=32)
-def fit_patch(settings: FitSettings = _OURS) -> FittedPatch:
-    """Fit the gyroid's semi-fundamental patch.
+def fit_patch(settings: FitSettings = _OURS, family: Family = GYROID) -> FittedPatch:
+    """Fit the semi-fundamental patch.
 
     Parameters
     ----------
     settings : FitSettings
+    family : Family
 
     Returns
     -------
     FittedPatch
     """
     fit = _fit_cloud if settings.parameterisation == "polar" else _fit_staged
-    net = fit(settings)
+    net = fit(settings, family)
     knots, weights = settings.knot_vector(), settings.weight_net()
     surface, normals = (NurbsSurface(net[..., part], weights, knots, knots) for part in (slice(3), slice(3, 6)))
-    return FittedPatch(settings, surface, normals)
+    return FittedPatch(settings, family, surface, normals)
 
 
 @lru_cache(maxsize=32)
@@ -123,7 +127,7 @@ def fit_report(fitted: FittedPatch) -> FitReport:
     samples = np.linspace(-1, 1, min(_REPORT_SAMPLES_PER_SPAN * (n - DEGREE) + 1, _MOST_REPORT_SAMPLES))
     u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
     exact = PARAMETERISATIONS[fitted.settings.parameterisation]
-    points, normals = exact(u, v)
+    points, normals = exact(u, v, fitted.family)
     distance = np.zeros(len(u))
     foot_u, foot_v = u.copy(), v.copy()
     for _ in range(_FOOT_POINT_STEPS):
@@ -137,7 +141,8 @@ def fit_report(fitted: FittedPatch) -> FitReport:
             break
     sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
     curvature = fitted.surface.mean_curvature(samples[:, np.newaxis], samples[np.newaxis]) * _CELL_SIZE
-    at_corners = fitted.surface.evaluate(*parameter_corners().T)
+    corner_u, corner_v = parameter_corners().T
+    off_corners = fitted.surface.evaluate(corner_u, corner_v) - exact(corner_u, corner_v, fitted.family)[0]
     return FitReport(
         max_distance=float(np.max(np.abs(distance))) / _CELL_SIZE,
         rms_distance=float(np.sqrt(np.mean(distance**2))) / _CELL_SIZE,
@@ -145,11 +150,11 @@ def fit_report(fitted: FittedPatch) -> FitReport:
         max_mean_curvature=float(np.max(np.abs(curvature))),
         rms_mean_curvature=float(np.sqrt(np.mean(curvature**2))),
         edge_gap=edge_gap(fitted),
-        corner_error=float(np.max(np.linalg.norm(at_corners - exact(*parameter_corners().T)[0], axis=1)) / _CELL_SIZE),
+        corner_error=float(np.max(np.linalg.norm(off_corners, axis=1)) / _CELL_SIZE),
     )
 
 
-def fit_within(settings: FitSettings, tolerance: float) -> FitSettings:
+def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID) -> FitSettings:
     """The same settings, with as many more control points as a tolerance takes.
 
     Parameters
@@ -157,13 +162,14 @@ def fit_within(settings: FitSettings, tolerance: float) -> FitSettings:
     settings : FitSettings
     tolerance : float
         Largest deviation of the mid-surface, in cell sizes.
+    family : Family
 
     Raises
     ------
     ParameterError
         If it is out of reach, or the settings' own knots and weights miss it.
     """
-    while (reached := fit_report(fit_patch(settings)).max_distance) > tolerance:
+    while (reached := fit_report(fit_patch(settings, family)).max_distance) > tolerance:
         n = settings.control_points
         if n == MOST_CONTROL_POINTS or not settings.plain:
             raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
@@ -177,7 +183,7 @@ def edge_gap(fitted: FittedPatch) -> float:
     The neighbour is the patch's image under the half-turn about the normal at the edge's midpoint. It meets the edge
     with one of its own, run backwards; which one depends on the placement, so every pair is compared.
     """
-    return _gap(fitted.surface, EDGE_HALF_TURN_SHIFT) / _CELL_SIZE
+    return _gap(fitted.surface, edge_half_turn_shift(fitted.family)) / _CELL_SIZE
 
 
 @lru_cache(maxsize=32)
@@ -230,10 +236,10 @@ def _gap(surface: NurbsSurface, shift: Floats, turned_over: float = 1.0) -> floa
     return float(max(np.max(np.linalg.norm(edge - image, axis=1)) for edge in edges for image in images))
 
 
-def _fit_staged(settings: FitSettings) -> Floats:
+def _fit_staged(settings: FitSettings, family: Family) -> Floats:
     """Corners, then edges, then interior; returns the net of (point, normal), shape (n, n, 6)."""
     n, knots, weights = settings.control_points, settings.knot_vector(), settings.weight_net()
-    exact = PARAMETERISATIONS[settings.parameterisation]
+    exact = partial(PARAMETERISATIONS[settings.parameterisation], family=family)
     samples, sample_weights = gauss_points(knots, _SAMPLES_PER_SPAN)
     functions = basis(knots, DEGREE, samples)
     net = np.zeros((n, n, 6))
@@ -274,7 +280,7 @@ def _missing_normals(rational: Floats, quadrature: Floats, area: Floats, normals
     return np.asarray(spread * (shortage / (quadrature @ np.sum(rational @ spread * area, axis=1))))
 
 
-def _fit_cloud(settings: FitSettings) -> Floats:
+def _fit_cloud(settings: FitSettings, family: Family) -> Floats:
     """All control points at once, from a cloud even in radius and angle (Fig. 5); shape (n, n, 6)."""
     n, knots = settings.control_points, settings.knot_vector()
     radius = np.arange(1, _CLOUD_RADII + 1) / _CLOUD_RADII
@@ -287,7 +293,7 @@ def _fit_cloud(settings: FitSettings) -> Floats:
     products = basis(knots, DEGREE, u)[:, :, np.newaxis] * basis(knots, DEGREE, v)[:, np.newaxis, :]
     rational = (products * settings.weight_net()).reshape(len(u), n * n)
     rational /= rational.sum(axis=1, keepdims=True)
-    samples = np.concatenate(PARAMETERISATIONS[settings.parameterisation](u, v), axis=-1)
+    samples = np.concatenate(PARAMETERISATIONS[settings.parameterisation](u, v, family), axis=-1)
     return _least_squares(rational, samples, np.ones(len(u))).reshape(n, n, 6)
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import SoundnessError
+from gyroid_cad.families import USUAL, MinimalSurface
 from gyroid_cad.fields import Field, evaluated, given_as
 from gyroid_cad.maps import OPEN, SpaceMap, carried, differences
-from gyroid_cad.tube import LARGEST_DENSITY, thickness_of_density
 
 __all__ = ["THINNEST_WALL", "Grading", "Laid"]
 
@@ -61,6 +61,8 @@ class Grading:
     scale_field : float or Field, optional
         Factor on the position, without unit.
     map : SpaceMap, optional
+    surface : MinimalSurface
+        Whose tube formula it goes by.
     """
 
     cell_size: float
@@ -68,6 +70,7 @@ class Grading:
     density: float | Field | None = None
     scale_field: float | Field | None = None
     map: SpaceMap | None = None
+    surface: MinimalSurface = USUAL
 
     @property
     def uniform(self) -> bool:
@@ -176,9 +179,10 @@ class Grading:
             return values
         _require(parameter, values, points, 0.0, "above", "everywhere in the lattice")
         worst = int(np.argmax(values))
-        if values[worst] >= LARGEST_DENSITY:
+        largest = self.surface.tube.largest_density
+        if values[worst] >= largest:
             reason = "the density at which the wall meets itself"
-            raise SoundnessError(parameter, float(values[worst]), _place(points, worst), LARGEST_DENSITY, reason)
+            raise SoundnessError(parameter, float(values[worst]), _place(points, worst), largest, reason)
         return values
 
     def _thickness(self, points: Floats, spacing: Floats | float) -> Floats:
@@ -187,7 +191,7 @@ class Grading:
             return asked
         # The wall is stretched with the space across it, as if it had been mapped itself: so the volume
         # fraction is kept, to first order in the thickness, however the map stretches.
-        thickness = np.asarray(thickness_of_density(asked) * self.cell_size * spacing)
+        thickness = np.asarray(self.surface.tube.thickness(asked) * self.cell_size * spacing)
         _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall", "thickness", " mm")
         return thickness
 

@@ -20,6 +20,7 @@ from gyroid_cad.covering import (
 )
 from gyroid_cad.errors import SoundnessError
 from gyroid_cad.exact_wall import laid_patches, patch_points
+from gyroid_cad.families import MinimalSurface
 from gyroid_cad.fields import Field
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.grading import Grading
@@ -78,7 +79,7 @@ class Infill:
 
     def offsets(self, points: Floats) -> Floats:
         """How far points of the part's space lie from an endless mid-surface, in mm."""
-        return periodic_offsets(self.frame, self.grading.cell_size, points)
+        return periodic_offsets(self.frame, self.grading.cell_size, points, self.grading.surface)
 
     def holds(self, region: Region, points: Floats) -> Booleans:
         """Which points of the part's space, shape (n, 3), lie in a region, to about 1e-3 cell sizes."""
@@ -124,6 +125,7 @@ def endless_infill(
     fit: FitSettings,
     tolerance: float,
     timed: Timed,
+    surface: MinimalSurface,
 ) -> Infill:
     """An endless lattice, as far as a box in the part's space needs it.
 
@@ -140,16 +142,18 @@ def endless_infill(
         Of a wall that varies, in cell sizes.
     timed : callable
         A context for each stage, by its name.
+    surface : MinimalSurface
 
     Raises
     ------
     ParameterError, SoundnessError, FitError
     """
-    grading = Grading(cell_size, _in_frame(regions.thickness, frame), _in_frame(regions.density, frame))
+    thickness, density = (_in_frame(value, frame) for value in (regions.thickness, regions.density))
+    grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
             thinnest, thickest = wall_extremes(low, high, frame, grading)
-            complex = covering_complex(low, high, frame, cell_size, thickest / 2)
+            complex = covering_complex(low, high, frame, cell_size, thickest / 2, surface)
         wall, refit = fit_wall(complex, grading, fit, tolerance, timed)
     except SoundnessError as error:
         raise _moved(error, frame) from None

@@ -18,6 +18,7 @@ from gyroid_cad.checks import finite_number, positive_number
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
+from gyroid_cad.families import USUAL, MinimalSurface, surface_named
 from gyroid_cad.fields import Field, FieldLike, as_field
 from gyroid_cad.fit import FitSettings, fit_within
 from gyroid_cad.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
@@ -40,7 +41,6 @@ from gyroid_cad.paper import paper_units
 from gyroid_cad.report import LatticeReport, report_of
 from gyroid_cad.stages import Progress, timed
 from gyroid_cad.triangles import TriangleReport, Triangles, triangle_report, triangles
-from gyroid_cad.tube import density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ _FIELDS = {
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """A block of gyroid cells: alike, or with walls, cells and space that vary.
+    """A block of cells of the gyroid or another surface: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches
     are whole: the mid-surface reaches a quarter of a cell beyond the block, the wall about half its thickness more.
@@ -96,6 +96,8 @@ class Lattice:
         out, 1e-4 where the lattice varies, and ``fit`` as it is where cells are alike.
     trim : {"box"}, optional
         Cut to the block of cells itself, with flat sides, instead of whole patches. Not where space varies.
+    surface : {"gyroid", "diamond", "primitive"}
+        Schwarz's diamond and primitive surfaces have walls of their own largest thickness and density.
 
     Raises
     ------
@@ -112,6 +114,7 @@ class Lattice:
     map: MapLike | None = None
     tolerance: float | None = None
     trim: str | None = None
+    surface: str = USUAL.name
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -125,14 +128,15 @@ class Lattice:
                 object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
         if self.map is not None:
             object.__setattr__(self, "map", as_map(self.map))
+        surface_named(self.surface)
         self._require_fit()
         self._require_trim()
         if not self.uniform:
             self._require_variable()
         elif self.density is None:
-            require_thickness(self.wall_thickness, self.cell_size)
+            require_thickness(self.wall_thickness, self.cell_size, self.minimal_surface.tube)
         else:
-            require_density(self.volume_fraction, self.cell_size)
+            require_density(self.volume_fraction, self.cell_size, self.minimal_surface.tube)
 
     @classmethod
     def paper(
@@ -143,6 +147,7 @@ class Lattice:
         scale: float = 1.0,
         fit: FitSettings | None = None,
         tolerance: float | None = None,
+        surface: str = USUAL.name,
     ) -> Self:
         """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
 
@@ -156,7 +161,7 @@ class Lattice:
             In BC units: a place p is moved to bc_length(p) p.
         scale : float
             Millimetres per unit of BC length.
-        fit, tolerance
+        fit, tolerance, surface
             As of :class:`Lattice`.
 
         Raises
@@ -171,7 +176,13 @@ class Lattice:
             fit=fit or FitSettings(),
             scale_field=given.scale_field,
             tolerance=tolerance,
+            surface=surface,
         )
+
+    @property
+    def minimal_surface(self) -> MinimalSurface:
+        """The surface of that name, from the table of families."""
+        return surface_named(self.surface)
 
     @property
     def uniform(self) -> bool:
@@ -186,7 +197,7 @@ class Lattice:
             return self._measures().mean_thickness
         if self.density is None:
             return float(self.thickness)  # type: ignore[arg-type]
-        return thickness_of_density(self.density) * self.cell_size  # type: ignore[arg-type]
+        return self.minimal_surface.tube.thickness(self.density) * self.cell_size  # type: ignore[arg-type]
 
     @property
     def volume_fraction(self) -> float:
@@ -194,7 +205,7 @@ class Lattice:
         if not self.uniform:
             return self.exact_volume / block_volume(self.cells, self._grading())
         if self.density is None:
-            return density_of_thickness(self.wall_thickness / self.cell_size)
+            return self.minimal_surface.tube.density(self.wall_thickness / self.cell_size)
         return float(self.density)  # type: ignore[arg-type]
 
     @property
@@ -408,15 +419,22 @@ class Lattice:
     def _recipe(self) -> Recipe:
         settings = self.fit
         if self.uniform and self.tolerance is not None:
-            settings = fit_within(settings, self.tolerance)
+            settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
         tolerance = self.tolerance or USUAL_TOLERANCE
         return Recipe(self.cells, self._grading(), settings, tolerance, self.trim == BOX)
 
     def _grading(self) -> Grading:
         if self.uniform:
-            return Grading(self.cell_size, self.wall_thickness)
+            return Grading(self.cell_size, self.wall_thickness, surface=self.minimal_surface)
         space = None if self.map is None else space_over(self.map, self.cells, self.cell_size)  # type: ignore[arg-type]
-        return Grading(self.cell_size, self.thickness, self.density, self.scale_field, space)  # type: ignore[arg-type]
+        return Grading(
+            self.cell_size,
+            self.thickness,  # type: ignore[arg-type]
+            self.density,  # type: ignore[arg-type]
+            self.scale_field,  # type: ignore[arg-type]
+            space,
+            self.minimal_surface,
+        )
 
     def _measures(self) -> ExactMeasures:
         return _measures(self.cells, self._grading())
@@ -427,7 +445,7 @@ class Lattice:
             if isinstance(value := getattr(self, name), float):
                 positive_number(name, value)
         if isinstance(self.density, float):
-            require_density(self.density, self.cell_size)
+            require_density(self.density, self.cell_size, self.minimal_surface.tube)
         if self.scale_field is not None and any(self._grading().map_closes):
             raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
 
@@ -453,4 +471,4 @@ class Lattice:
 
 @lru_cache(maxsize=16)
 def _measures(cells: tuple[int, int, int], grading: Grading) -> ExactMeasures:
-    return exact_measures(build_complex(cells, closed=grading.closed), grading)
+    return exact_measures(build_complex(cells, grading.surface.cell, grading.closed), grading)

@@ -153,7 +153,7 @@ def laid_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
 def _complex(recipe: Recipe) -> CellComplex:
     grading = recipe.grading
     if not recipe.boxed:
-        return build_complex(recipe.cells, closed=grading.closed)
+        return build_complex(recipe.cells, grading.surface.cell, grading.closed)
     low, high = np.zeros(3), np.array(recipe.cells) * grading.cell_size
     reach = wall_extremes(low, high, AT_HOME, grading)[1] / 2 + _SHIFTS * grading.cell_size
-    return covering_complex(low, high, AT_HOME, grading.cell_size, reach)
+    return covering_complex(low, high, AT_HOME, grading.cell_size, reach, grading.surface)

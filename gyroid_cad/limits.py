@@ -8,7 +8,7 @@ from numbers import Integral
 from gyroid_cad.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.grading import THINNEST_WALL
-from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, density_of_thickness, thickness_of_density
+from gyroid_cad.tube import TubeLaw
 
 __all__ = [
     "require_cell_size",
@@ -35,36 +35,36 @@ def require_cell_size(cell_size: float) -> None:
         raise ParameterError("cell_size", cell_size, f"{SMALLEST_CELL:g} to {LARGEST_CELL:g} mm")
 
 
-def require_thickness(thickness: float, cell_size: float) -> None:
+def require_thickness(thickness: float, cell_size: float, tube: TubeLaw) -> None:
     """Refuse a constant wall, in mm, that is thinner than the kernel bears or past the curvature limit.
 
     Raises
     ------
     ParameterError
     """
-    limit = LARGEST_THICKNESS * cell_size
+    limit = tube.largest_thickness * cell_size
     if not THINNEST_WALL <= thickness < limit:
         raise ParameterError(
             "thickness",
             thickness,
             f"{THINNEST_WALL:g} mm or more and below {limit:.5g} mm, "
-            f"the curvature limit {LARGEST_THICKNESS:.5f} x cell_size",
+            f"the curvature limit {tube.largest_thickness:.5f} x cell_size",
         )
 
 
-def require_density(density: float, cell_size: float) -> None:
+def require_density(density: float, cell_size: float, tube: TubeLaw) -> None:
     """Refuse a constant volume fraction whose wall is thinner than the kernel bears or past the curvature limit.
 
     Raises
     ------
     ParameterError
     """
-    if not 0 < density < LARGEST_DENSITY:
+    if not 0 < density < tube.largest_density:
         raise ParameterError(
-            "density", density, f"above 0 and below {LARGEST_DENSITY:.5f}, where the wall meets itself"
+            "density", density, f"above 0 and below {tube.largest_density:.5f}, where the wall meets itself"
         )
-    if thickness_of_density(density) * cell_size < THINNEST_WALL:
-        thinnest = density_of_thickness(THINNEST_WALL / cell_size)
+    if tube.thickness(density) * cell_size < THINNEST_WALL:
+        thinnest = tube.density(THINNEST_WALL / cell_size)
         raise ParameterError("density", density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
 
 

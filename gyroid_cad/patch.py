@@ -9,10 +9,11 @@ k + 1, and (u, v) to (-v, u).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from math import pi, sqrt
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from gyroid_cad.weierstrass import (
     CORNER,
     GYROID,
+    Family,
     corner_chart_omega,
     corner_chart_points,
     corner_chart_tangents,
@@ -30,9 +32,9 @@ from gyroid_cad.weierstrass import (
 
 __all__ = [
     "EDGE_HALF_TURN",
-    "EDGE_HALF_TURN_SHIFT",
     "PARAMETERISATIONS",
     "ROTOINVERSION",
+    "edge_half_turn_shift",
     "exact_edge",
     "parameter_corners",
     "polar",
@@ -41,27 +43,25 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-Parameterisation = Callable[[ArrayLike, ArrayLike], tuple[Floats, Floats]]
+
+
+class Parameterisation(Protocol):
+    """Points and normals of the patch at (u, v)."""
+
+    def __call__(self, u: ArrayLike, v: ArrayLike, family: Family = ...) -> tuple[Floats, Floats]: ...
+
 
 # From the Weierstrass frame to the cell's axes: T_yz R_z(-45 deg) of eq. (6).
 _TO_CELL_AXES = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, -sqrt(2)]]) / sqrt(2)
-# The patch's rotoinversion and the half-turn p -> H p + h about the normal at
-# the midpoint of edge 3, in the cell's axes.
+# The patch's rotoinversion, and H of the half-turn p -> H p + h about the normal at the midpoint of edge 3, in the
+# cell's axes: of every family, for they have the same normals.
 ROTOINVERSION = np.array([[0, -1, 0], [1, 0, 0], [0, 0, -1]])
 EDGE_HALF_TURN = np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0]])
-EDGE_HALF_TURN_SHIFT = np.array([-0.25, 0.5, 0.25])
 
 _ARC_HALF_ANGLE = pi / 12
-# Along its axis the patch is seen over the square with corners (+-sqrt(2)/4, +-sqrt(2)/4).
-_HALF_SQUARE = sqrt(2) / 4
 _NEWTON_STEPS = 12
 # Convergence is quadratic: after a step this small the error is below rounding.
 _NEWTON_TOLERANCE = 1e-10
-# Where the interior lies between the edges is free. These two coefficients, of the simplest fields with
-# the patch's fourfold symmetry, make the 10 x 10 fit 2.5 times closer than plain transfinite
-# interpolation; benchmarks/parameterisation.py scans them.
-_RADIAL_SHIFT = 0.0093
-_CUBIC_SHIFT = -0.0062
 
 
 def parameter_corners() -> Floats:
@@ -69,18 +69,21 @@ def parameter_corners() -> Floats:
     return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
-def smooth(u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
+def smooth(u: ArrayLike, v: ArrayLike, family: Family = GYROID) -> tuple[Floats, Floats]:
     """Exact points and normals, in a parameterisation analytic up to and including the corners.
 
     Seen along the patch's axis, the four exact edge curves are filled by transfinite interpolation (The
-    NURBS Book, sec. 10.6, Coons) with a small symmetric shift of the interior; the exact surface is a graph over
-    that view. On the edges the parameter is the coordinate along the chord, which the half-turn that
-    carries the patch onto its neighbour reverses: so neighbours agree on their common edge.
+    NURBS Book, sec. 10.6, Coons), and the interior, which is free to lie anywhere between them, is shifted by two small
+    fields with the patch's fourfold symmetry, the family's own: 2.5 times closer 10 x 10 fits
+    (benchmarks/parameterisation.py scans them). The exact surface is a graph over
+    that view. On the edges the parameter is the coordinate along the chord, which the half-turn about the normal at
+    the edge's midpoint reverses: so neighbours agree on their common edge.
 
     Parameters
     ----------
     u, v : array_like
         In [-1, 1], broadcast against each other.
+    family : Family
 
     Returns
     -------
@@ -88,13 +91,13 @@ def smooth(u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
         Points in units of a; unit normals on the side of dX/du x dX/dv.
     """
     u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
-    plan = _plan(u.ravel(), v.ravel())
-    surface, unit_normals = _lift(plan)
+    plan = _plan(u.ravel(), v.ravel(), family)
+    surface, unit_normals = _lift(plan, family)
     shape = (*u.shape, 3)
     return (surface @ _TO_CELL_AXES.T).reshape(shape), (unit_normals @ _TO_CELL_AXES.T).reshape(shape)
 
 
-def polar(u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
+def polar(u: ArrayLike, v: ArrayLike, family: Family = GYROID) -> tuple[Floats, Floats]:
     """Exact points and normals in the paper's parameterisation (Figs. 2 and 5).
 
     Rays from the centre of the square are mapped evenly onto rays from ``w = 0``, and the square's
@@ -104,6 +107,7 @@ def polar(u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
     ----------
     u, v : array_like
         In [-1, 1], broadcast against each other.
+    family : Family
 
     Returns
     -------
@@ -117,31 +121,42 @@ def polar(u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
     along = np.choose(edge, [u, v, -u, -v]) / np.where(radius == 0, 1, radius)
     arc = sqrt(2) * np.exp(1j * _ARC_HALF_ANGLE * along) - 1
     omega = radius * arc * np.exp(1j * pi / 4) * np.array([1j, -1, -1j, 1])[edge]
-    return points(omega) @ _TO_CELL_AXES.T, normals(omega) @ _TO_CELL_AXES.T
+    return points(omega, family) @ _TO_CELL_AXES.T, normals(omega) @ _TO_CELL_AXES.T
 
 
 PARAMETERISATIONS: Mapping[str, Parameterisation] = MappingProxyType({"smooth": smooth, "polar": polar})
 
 
-def exact_edge(along: ArrayLike) -> Floats:
+def exact_edge(along: ArrayLike, family: Family = GYROID) -> Floats:
     """Exact points of edge 3, from corner 3 (-1) to corner 0 (+1), by the coordinate along the chord.
 
     Parameters
     ----------
     along : array_like, any shape
         In [-1, 1].
+    family : Family
 
     Returns
     -------
     ndarray, shape (*along.shape, 3)
         In units of a.
     """
-    return _edge(np.asarray(along, float)) @ _TO_CELL_AXES.T
+    return _edge(np.asarray(along, float), family) @ _TO_CELL_AXES.T
 
 
-def _edge(along: Floats) -> Floats:
+def edge_half_turn_shift(family: Family = GYROID) -> Floats:
+    """h of the half-turn p -> :data:`EDGE_HALF_TURN` p + h about the normal at the midpoint of edge 3; shape (3,).
+
+    It is a symmetry of every associate surface: the Gauss map's half-turn about that normal carries the Weierstrass
+    integrand to itself, whatever the angle.
+    """
+    end, start = exact_edge(np.array([-1.0, 1.0]), family)
+    return np.asarray(start - EDGE_HALF_TURN @ end)
+
+
+def _edge(along: Floats, family: Family) -> Floats:
     """Edge 3 in the Weierstrass frame, where it leaves the corner w = c and ends at w = ic."""
-    start, middle = _edge_chart(np.array([0.0, 1.0]))[0]
+    start, middle = _edge_chart(np.array([0.0, 1.0]), family)[0]
     end = rotoinversion(start)
     half_chord = np.linalg.norm(end - start) / 2
     direction = (end - start) / (2 * half_chord)
@@ -149,18 +164,18 @@ def _edge(along: Floats) -> Floats:
     target = -np.abs(along) * half_chord
     sigma = 1 - np.abs(along)
     for _ in range(_NEWTON_STEPS):
-        position, velocity = _edge_chart(sigma)
+        position, velocity = _edge_chart(sigma, family)
         step = (target - (position - middle) @ direction) / (velocity @ direction)
         sigma = sigma + step
         if np.max(np.abs(step), initial=0.0) < _NEWTON_TOLERANCE:
             break
-    first_half = _edge_chart(sigma)[0] - middle
+    first_half = _edge_chart(sigma, family)[0] - middle
     axis = normals((sqrt(2) - 1) * np.exp(1j * pi / 4))
     half_turned = 2 * (first_half @ axis)[..., np.newaxis] * axis - first_half
     return np.asarray(middle + np.where((along <= 0)[..., np.newaxis], first_half, half_turned))
 
 
-def _edge_chart(sigma: Floats) -> tuple[Floats, Floats]:
+def _edge_chart(sigma: Floats, family: Family) -> tuple[Floats, Floats]:
     """Points and derivatives on the first half of edge 3; sigma is analytic at the corner (sigma = 0).
 
     The arc is ``w = e^{i pi/4} (sqrt(2) e^{i phi} - 1)`` with ``phi = phi_0 (sigma^2 - 1)``; with
@@ -173,33 +188,35 @@ def _edge_chart(sigma: Floats) -> tuple[Floats, Floats]:
     ratio = np.sqrt(-factor * growth)
     tau = sigma * ratio
     tau_rate = -factor * 1j * _ARC_HALF_ANGLE * np.exp(turned) / ratio
-    return corner_chart_points(tau), (corner_chart_tangents(tau) * tau_rate[..., np.newaxis]).real
+    return corner_chart_points(tau, family), (corner_chart_tangents(tau, family) * tau_rate[..., np.newaxis]).real
 
 
-def _plan(u: Floats, v: Floats) -> Floats:
+def _plan(u: Floats, v: Floats, family: Family) -> Floats:
     """Where (u, v) lies in the view along the patch's axis (x, y of the Weierstrass frame)."""
     parameters, inverse = np.unique(np.concatenate([u, v, -u, -v]), return_inverse=True)
-    edge = _edge(parameters)
+    edge = _edge(parameters, family)
     at_u, at_v, at_minus_u, at_minus_v = edge[inverse].reshape(4, -1, 3)
     left = at_minus_v[:, :2]
     bottom = rotoinversion(at_u, 1)[:, :2]
     right = rotoinversion(at_v, 2)[:, :2]
     top = rotoinversion(at_minus_u, 3)[:, :2]
-    corners = [rotoinversion(_edge(np.array([1.0]))[0], k)[:2] for k in range(4)]
+    corners = [rotoinversion(_edge(np.array([1.0]), family)[0], k)[:2] for k in range(4)]
     a, b, c, d = (weight[:, np.newaxis] for weight in ((1 - u) / 2, (1 + u) / 2, (1 - v) / 2, (1 + v) / 2))
     plan = a * left + b * right + c * bottom + d * top
     plan -= a * c * corners[0] + b * c * corners[1] + b * d * corners[2] + a * d * corners[3]
     # x + iy turns like v + iu: the rotoinversion takes (x, y) to (y, -x) and (u, v) to (-v, u).
     position = v + 1j * u
-    shift = (1 - u * u) * (1 - v * v) * (_RADIAL_SHIFT * position + 1j * _CUBIC_SHIFT * np.conj(position) ** 3)
+    size = complex(*corners[0]) / (-1 - 1j)
+    radial, cubic = family.interior_shift
+    shift = size * (1 - u * u) * (1 - v * v) * (radial * position + cubic * np.conj(position) ** 3)
     return np.asarray(plan + np.stack([shift.real, shift.imag], axis=-1))
 
 
-def _lift(plan: Floats) -> tuple[Floats, Floats]:
+def _lift(plan: Floats, family: Family) -> tuple[Floats, Floats]:
     """Points and normals of the exact surface over points of its view along the axis."""
     # At the centre x - iy = scale e^{i angle} w, so the sector |arg w| < 45 deg about corner w = c is seen
     # about the direction -angle; it twists by a few degrees outwards, which the corner's chart bears.
-    direction = np.arctan2(plan[:, 1], plan[:, 0]) + GYROID.bonnet_angle
+    direction = np.arctan2(plan[:, 1], plan[:, 0]) + family.bonnet_angle
     quarter = np.round(-direction / (pi / 2)).astype(int) % 4
     surface = np.empty((len(plan), 3))
     unit_normals = np.empty((len(plan), 3))
@@ -209,19 +226,19 @@ def _lift(plan: Floats) -> tuple[Floats, Floats]:
         if not chosen.any():
             continue
         x, y = plan[chosen].T
-        tau = _solve_corner_chart(*[(x, y), (-y, x), (-x, -y), (y, -x)][turn])
-        surface[chosen] = rotoinversion(corner_chart_points(tau), turn)
+        tau = _solve_corner_chart(*[(x, y), (-y, x), (-x, -y), (y, -x)][turn], family)
+        surface[chosen] = rotoinversion(corner_chart_points(tau, family), turn)
         unit_normals[chosen] = normals(corner_chart_omega(tau) * (1, 1j, -1, -1j)[turn])
     return surface, unit_normals
 
 
-def _solve_corner_chart(x: Floats, y: Floats) -> Complexes:
+def _solve_corner_chart(x: Floats, y: Floats, family: Family) -> Complexes:
     """Newton's method for the chart value above (x, y) in the sector of corner c."""
-    coefficients = _inverse_chart()
-    tau = np.polynomial.polynomial.polyval2d(x / _HALF_SQUARE, y / _HALF_SQUARE, coefficients)
+    coefficients = _inverse_chart(family)
+    tau = np.polynomial.polynomial.polyval2d(x / family.scale, y / family.scale, coefficients)
     for _ in range(_NEWTON_STEPS):
-        position = corner_chart_points(tau)
-        tangent = corner_chart_tangents(tau)
+        position = corner_chart_points(tau, family)
+        tangent = corner_chart_tangents(tau, family)
         x_rate, y_rate = tangent[:, 0], tangent[:, 1]
         dx, dy = x - position[:, 0], y - position[:, 1]
         # Re(x_rate step) = dx and Re(y_rate step) = dy.
@@ -232,14 +249,14 @@ def _solve_corner_chart(x: Floats, y: Floats) -> Complexes:
     return np.asarray(tau)
 
 
-@lru_cache(maxsize=1)
-def _inverse_chart(degree: int = 4) -> Complexes:
+@lru_cache(maxsize=8)
+def _inverse_chart(family: Family, degree: int = 4) -> Complexes:
     """Polynomial coefficients of tau(x, y), fitted to exact samples of the sector: Newton's start."""
     half_arc = np.exp(1j * pi / 4) * (sqrt(2) * np.exp(1j * _ARC_HALF_ANGLE * np.linspace(-1, 0, 8)) - 1)
     arc = np.concatenate([half_arc, np.conj(half_arc)])
     omega = np.linspace(0, 1, 13)[:, np.newaxis] * arc
     tau = np.sqrt(1 - omega / CORNER).ravel()
-    x, y, _ = corner_chart_points(tau).T
-    powers = np.polynomial.polynomial.polyvander2d(x / _HALF_SQUARE, y / _HALF_SQUARE, [degree, degree])
+    x, y, _ = corner_chart_points(tau, family).T
+    powers = np.polynomial.polynomial.polyvander2d(x / family.scale, y / family.scale, [degree, degree])
     solution = np.linalg.solve(powers.T @ powers, powers.T @ tau)
     return np.asarray(solution.reshape(degree + 1, degree + 1))

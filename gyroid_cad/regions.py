@@ -11,7 +11,7 @@ from gyroid_cad.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields import Field, FieldLike, as_field
 from gyroid_cad.limits import require_density, require_one, require_thickness
-from gyroid_cad.tube import LARGEST_DENSITY, offset_of_network, thickness_of_density
+from gyroid_cad.tube import TubeLaw
 
 __all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
 
@@ -73,7 +73,9 @@ class Regions:
     density: float | Field | None = None
 
 
-def regions_of(kind: str, cell_size: float, thickness: FieldLike | None, density: FieldLike | None) -> Regions:
+def regions_of(
+    kind: str, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw
+) -> Regions:
     """The regions that a kind is made of.
 
     Parameters
@@ -84,6 +86,8 @@ def regions_of(kind: str, cell_size: float, thickness: FieldLike | None, density
         In mm.
     thickness, density : number or field, optional
         Exactly one, but none for the bare surface.
+    tube : TubeLaw
+        Of the surface.
 
     Raises
     ------
@@ -98,13 +102,13 @@ def regions_of(kind: str, cell_size: float, thickness: FieldLike | None, density
         return Regions((Region(SURFACE, None, None, surface=True),), thickness=0.0)
     require_one(thickness, density)
     if kind in (NETWORK_A, NETWORK_B):
-        return _network(kind, cell_size, density)
+        return _network(kind, cell_size, density, tube)
     regions = (
         (Region("channel-a", 1.0, None, fluid=True), Region("channel-b", None, -1.0, fluid=True))
         if kind == CHANNELS
         else (Region(SHEET, -1.0, 1.0),)
     )
-    return _wall(regions, cell_size, thickness, density)
+    return _wall(regions, cell_size, thickness, density, tube)
 
 
 def _wall(
@@ -112,26 +116,27 @@ def _wall(
     cell_size: float,
     thickness: FieldLike | None,
     density: FieldLike | None,
+    tube: TubeLaw,
 ) -> Regions:
     if thickness is not None:
         wall = as_field("thickness", thickness, "a length in mm")
         if isinstance(wall, float):
-            require_thickness(wall, cell_size)
+            require_thickness(wall, cell_size, tube)
         return Regions(regions, thickness=wall)
     fraction = as_field("density", density, "a volume fraction")
     if isinstance(fraction, float):
-        require_density(fraction, cell_size)
-        return Regions(regions, thickness=float(thickness_of_density(fraction) * cell_size))
+        require_density(fraction, cell_size, tube)
+        return Regions(regions, thickness=float(tube.thickness(fraction) * cell_size))
     return Regions(regions, density=fraction)
 
 
-def _network(kind: str, cell_size: float, density: FieldLike | None) -> Regions:
-    low, high = (1 - LARGEST_DENSITY) / 2, (1 + LARGEST_DENSITY) / 2
+def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
+    low, high = (1 - tube.largest_density) / 2, (1 + tube.largest_density) / 2
     accepted = f"the labyrinth's volume fraction, one number above {low:.5f} and below {high:.5f}"
     fraction = finite_number("density", density, accepted)
     if not low < fraction < high:
         raise ParameterError("density", density, accepted)
-    offset = float(offset_of_network(fraction) * cell_size)
+    offset = float(tube.network_offset(fraction) * cell_size)
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)
     return Regions((region,), thickness=2 * abs(offset))

@@ -90,7 +90,7 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
     laid = built.laid
     refit, complex, recipe = laid.refit, laid.complex, laid.recipe
     with built.timed("fit report"):
-        fit = fit_report(fit_patch(recipe.settings))
+        fit = fit_report(fit_patch(recipe.settings, recipe.grading.surface.family))
     cell_size = recipe.grading.cell_size
     return LatticeReport(
         cells=built.cells,

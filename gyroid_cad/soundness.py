@@ -20,7 +20,6 @@ from gyroid_cad.exact_wall import differentiation_matrix, interpolation_matrix, 
 from gyroid_cad.fields import given_as
 from gyroid_cad.grading import Grading
 from gyroid_cad.nurbs import grid_derivatives
-from gyroid_cad.tube import density_of_thickness, thickness_of_density
 from gyroid_cad.wall import Wall
 
 __all__ = ["CLEARANCE_SAMPLES", "FOLD_SAMPLES", "require_sound", "require_sound_fit"]
@@ -309,5 +308,6 @@ def _too_thick(complex: CellComplex, grading: Grading, worst: _Worst) -> Soundne
     if grading.density is None:
         name = given_as("thickness", grading.thickness)
         return SoundnessError(name, asked, place, worst.factor * asked, worst.reason, unit=" mm")
-    limit = density_of_thickness(worst.factor * thickness_of_density(asked))
+    tube = grading.surface.tube
+    limit = tube.density(worst.factor * tube.thickness(asked))
     return SoundnessError(given_as("density", grading.density), asked, place, limit, worst.reason)

@@ -49,7 +49,7 @@ def fit_wall(
     """
     if grading.uniform:
         with timed("fit"):
-            patch = fit_patch(settings)
+            patch = fit_patch(settings, grading.surface.family)
         with timed("wall"):
             return build_wall(complex, patch, grading.cell_size, float(grading.thickness)), None  # type: ignore[arg-type]
     with timed("soundness"):

@@ -23,7 +23,9 @@ from gyroid_cad.errors import ParameterError
 
 __all__ = [
     "CORNER",
+    "DIAMOND",
     "GYROID",
+    "PRIMITIVE",
     "Family",
     "corner_chart_omega",
     "corner_chart_points",
@@ -72,15 +74,23 @@ class Family:
     bonnet_angle : float
         The angle of the associate surface, in radians.
     scale : float
-        The normalization factor (the paper's kappa), in units of the bounding-cell length.
+        The normalization factor (the paper's kappa), in units of the bounding-cell length, half the period.
+    interior_shift : tuple of complex
+        How the smooth parameterisation shifts the patch's interior; see :func:`gyroid_cad.patch.smooth`.
     """
 
     name: str
     bonnet_angle: float
     scale: float
+    interior_shift: tuple[complex, complex] = (0.0, 0.0)
 
 
-GYROID = Family("gyroid", atan2(K, K_PRIME), sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME))
+# Scales at which the patch's corners fall on the grid of quarters of the bounding-cell length.
+GYROID = Family(
+    "gyroid", atan2(K, K_PRIME), sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME), (0.026304372, -0.017536248j)
+)
+DIAMOND = Family("diamond", 0.0, 1 / K, (0.0622, -0.0133))
+PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.005, 0.01))
 
 
 def rotoinversion(vectors: ArrayLike, times: int = 1) -> Floats:

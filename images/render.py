@@ -101,6 +101,12 @@ def closed_cylinder() -> Picture:
     return Picture((lattice,), (1000, 750), (0, -3, 2.7), 1.5)
 
 
+def three_surfaces() -> Picture:
+    """Gyroid, diamond and primitive surface: as many cells, of one size and density."""
+    lattices = [Lattice((2, 2, 2), 10, density=0.25, surface=name) for name in ("gyroid", "diamond", "primitive")]
+    return Picture(tuple(lattices), (1500, 560), (3, -4, 2.4))
+
+
 def _specimen(
     cells: tuple[int, int, int], thickness_factor: float | str, bc_length: float | str, size: tuple[int, int]
 ) -> Picture:
@@ -116,6 +122,7 @@ PICTURES: tuple[Callable[[], Picture], ...] = (
     specimen_variable_both,
     bone_gradient,
     closed_cylinder,
+    three_surfaces,
 )
 
 
@@ -158,9 +165,9 @@ def render(picture: Picture, target: Path) -> Path:
         beside = seen[:, 0].max() + _GAP * np.ptp(seen[:, 0]) - points[:, 0].min() if len(seen) else 0.0
         seen = np.concatenate([seen, points + np.array([beside, 0, 0])])
         for actor in (
-            _surface(faces, WALL_COLOUR),
-            _surface(rims, picture.rim_colour),
-            *(_outlines(grids, picture.line_width) for grids in (faces, rims)),
+            surface_actor(faces, WALL_COLOUR),
+            surface_actor(rims, picture.rim_colour),
+            *(outline_actor(grids, picture.line_width) for grids in (faces, rims)),
         ):
             actor.SetPosition(*(beside * picture.axes[0]).tolist())
             renderer.AddActor(actor)
@@ -170,7 +177,7 @@ def render(picture: Picture, target: Path) -> Path:
 
 
 @dataclass(frozen=True, slots=True)
-class _Grids:
+class Grids:
     """Points and unit normals of faces on grids, shape (faces, m, m, 3) each."""
 
     points: Floats
@@ -190,7 +197,7 @@ def _rims(wall: Wall) -> Iterator[tuple[NurbsSurface, Floats]]:
         yield wall.side_wall(int(wall.patch_net[patch]), edge), wall.shifts[wall.patch_shift[patch]]
 
 
-def _sampled(faces: Iterator[tuple[NurbsSurface, Floats]]) -> _Grids:
+def _sampled(faces: Iterator[tuple[NurbsSurface, Floats]]) -> Grids:
     points, normals = [], []
     for surface, shift in faces:
         along = (np.linspace(knots[0], knots[-1], _FINENESS) for knots in (surface.knots_u, surface.knots_v))
@@ -200,10 +207,10 @@ def _sampled(faces: Iterator[tuple[NurbsSurface, Floats]]) -> _Grids:
         points.append(derivatives[0, 0] + shift)
         normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
     shape = (-1, _FINENESS, _FINENESS, 3)
-    return _Grids(np.reshape(points, shape), np.reshape(normals, shape))
+    return Grids(np.reshape(points, shape), np.reshape(normals, shape))
 
 
-def _surface(grids: _Grids, colour: Vector) -> vtk.vtkActor:
+def surface_actor(grids: Grids, colour: Vector) -> vtk.vtkActor:
     index = np.arange(grids.points[..., 0].size).reshape(grids.points.shape[:3])
     squares = np.stack([index[:, :-1, :-1], index[:, 1:, :-1], index[:, 1:, 1:], index[:, :-1, 1:]], axis=-1)
     mesh = _poly_data(grids.points)
@@ -216,7 +223,7 @@ def _surface(grids: _Grids, colour: Vector) -> vtk.vtkActor:
     return actor
 
 
-def _outlines(grids: _Grids, width: float) -> vtk.vtkActor:
+def outline_actor(grids: Grids, width: float) -> vtk.vtkActor:
     index = np.arange(grids.points[..., 0].size).reshape(grids.points.shape[:3])
     sides = np.concatenate([index[:, 0], index[:, -1], index[:, :, 0], index[:, :, -1]])
     outlines = _poly_data(grids.points)

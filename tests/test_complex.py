@@ -11,8 +11,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from gyroid_cad import complex as complex_module
+from gyroid_cad.bounding_cells import bounding_cell
 from gyroid_cad.complex import CellComplex, build_complex
-from gyroid_cad.symmetry import CELL_QUARTERS, Placements, bounding_cell, cubic_cell, placed_corners
+from gyroid_cad.families import USUAL
+from gyroid_cad.symmetry import CELL_QUARTERS, Placements, placed_corners
 
 SIDE = st.integers(1, 3)
 BLOCKS = st.tuples(SIDE, SIDE, SIDE)
@@ -25,19 +27,17 @@ def euler_characteristic(lattice: CellComplex) -> int:
 
 def folded_into_the_unit_box() -> Placements:
     """The patches of a cell moved by whole periods until every centre lies in [0, L)."""
-    cell = cubic_cell()
-    return Placements(cell.matrices, cell.translations % CELL_QUARTERS, cell.bounding_cell)
+    cell = USUAL.cell
+    return Placements(cell.patch, cell.matrices, cell.translations % CELL_QUARTERS, cell.bounding_cell)
 
 
 def with_the_fourth_bounding_cell_one_period_up() -> Placements:
-    cell = cubic_cell()
+    cell = USUAL.cell
     lifted = CELL_QUARTERS * np.outer(cell.bounding_cell == 3, [0, 0, 1])
-    return Placements(cell.matrices, cell.translations + lifted, cell.bounding_cell)
+    return Placements(cell.patch, cell.matrices, cell.translations + lifted, cell.bounding_cell)
 
 
-ARRANGEMENTS = st.sampled_from(
-    [cubic_cell(), folded_into_the_unit_box(), with_the_fourth_bounding_cell_one_period_up()]
-)
+ARRANGEMENTS = st.sampled_from([USUAL.cell, folded_into_the_unit_box(), with_the_fourth_bounding_cell_one_period_up()])
 
 
 @settings(max_examples=30, deadline=None)
@@ -144,7 +144,7 @@ def test_each_further_cell_adds_the_euler_characteristic_of_a_period() -> None:
 
 
 def test_a_bounding_cell_is_a_disk_of_six_patches_round_one_closed_fan() -> None:
-    disk = build_complex((1, 1, 1), bounding_cell())
+    disk = build_complex((1, 1, 1), bounding_cell(USUAL.patch))
     assert euler_characteristic(disk) == 1
     assert disk.patch_count == 6
     assert int(disk.free.sum()) == 12
@@ -184,12 +184,9 @@ def test_the_papers_arrangement_hangs_together(cells: tuple[int, int, int]) -> N
 
 
 def test_placements_that_pass_an_edge_to_three_patches_are_refused() -> None:
-    cell = bounding_cell()
-    thrice = Placements(
-        np.concatenate([cell.matrices, cell.matrices[:1]]),
-        np.concatenate([cell.translations, cell.translations[:1]]),
-        np.zeros(7, dtype=np.int64),
-    )
+    cell = bounding_cell(USUAL.patch)
+    first = Placements(cell.patch, cell.matrices[:1], cell.translations[:1], cell.bounding_cell[:1])
+    thrice = cell.joined(first)
     with pytest.raises(ValueError, match="more than two patches"):
         build_complex((1, 1, 1), thrice)
 

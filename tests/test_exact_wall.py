@@ -24,10 +24,12 @@ from gyroid_cad.exact_wall import (
     laid_patches,
     sampled_place,
 )
+from gyroid_cad.families import USUAL
 from gyroid_cad.fields import Field, as_field
 from gyroid_cad.grading import Grading
 from gyroid_cad.maps import SpaceMap
-from gyroid_cad.tube import AREA_PER_CELL, EULER_CHARACTERISTIC, density_of_thickness
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 Cells = tuple[int, int, int]
@@ -63,8 +65,8 @@ def of(thickness: Any = None, cells: Cells = (1, 1, 1), **varied: Any) -> ExactM
 @given(st.floats(1e-3, 0.37))
 def test_a_uniform_wall_has_the_volume_of_the_tube_formula(relative_thickness: float) -> None:
     measures = of(relative_thickness * L)
-    assert measures.volume == pytest.approx(density_of_thickness(relative_thickness) * L**3, rel=QUADRATURE)
-    assert measures.area == pytest.approx(AREA_PER_CELL * L**2, rel=QUADRATURE)
+    assert measures.volume == pytest.approx(TUBE.density(relative_thickness) * L**3, rel=QUADRATURE)
+    assert measures.area == pytest.approx(TUBE.area * L**2, rel=QUADRATURE)
     assert measures.mean_thickness == pytest.approx(relative_thickness * L, rel=1e-14)
 
 
@@ -118,7 +120,7 @@ def test_curvature_takes_the_same_volume_from_a_wall_twice_as_thick_eight_times(
     def taken(thickness: float) -> float:
         return of(thickness).volume - thickness * of(thickness).area
 
-    assert taken(1.0) == pytest.approx(2 * pi * EULER_CHARACTERISTIC / 12, rel=1e-7)
+    assert taken(1.0) == pytest.approx(2 * pi * TUBE.euler_characteristic / 12, rel=1e-7)
     assert taken(2.0) == pytest.approx(8 * taken(1.0), rel=1e-9)
 
 

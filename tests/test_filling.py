@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 import gyroid_cad.kernel.regional
 import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.filled_part import Filling
 from gyroid_cad.filling import Filled, _turn, fill, part_of
 from gyroid_cad.fit import FitSettings
@@ -25,7 +26,8 @@ from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.regions import KINDS
-from gyroid_cad.tube import density_of_thickness, thickness_of_density
+
+TUBE = USUAL.tube
 
 CELL, WALL, RADIUS = 10.0, 0.9, 2.2
 BALL = 4 / 3 * np.pi * RADIUS**3
@@ -73,16 +75,14 @@ def test_the_labyrinths_of_complementary_densities_are_the_whole_part() -> None:
 
 @pytest.mark.parametrize("density", [0.1, 0.3, 0.5, 0.7])
 def test_a_labyrinth_begins_where_half_of_space_less_half_a_wall_is_left(density: float) -> None:
-    from gyroid_cad.tube import offset_of_network
-
-    offset = offset_of_network(density)
-    assert 0.5 - np.sign(offset) * density_of_thickness(2 * abs(offset)) / 2 == pytest.approx(density, rel=1e-12)
+    offset = TUBE.network_offset(density)
+    assert 0.5 - np.sign(offset) * TUBE.density(2 * abs(offset)) / 2 == pytest.approx(density, rel=1e-12)
 
 
 def test_a_box_of_one_period_is_as_dense_as_was_asked() -> None:
     made = fill(cq.Workplane().box(CELL, CELL, CELL).translate((1, 2, 3)), CELL, density=0.25, origin=(0.3, 0.2, 0.1))
     assert made.report.density == pytest.approx(0.25, rel=1e-4)
-    assert made.report.thickness == pytest.approx(thickness_of_density(0.25) * CELL)
+    assert made.report.thickness == pytest.approx(TUBE.thickness(0.25) * CELL)
 
 
 def test_moving_part_and_lattice_together_changes_nothing() -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from gyroid_cad.errors import FitError, ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import (
     EDGE_GAP_LIMIT,
     FitSettings,
@@ -24,7 +25,8 @@ from gyroid_cad.fit import (
 )
 from gyroid_cad.nurbs import gauss_points
 from gyroid_cad.patch import ROTOINVERSION, parameter_corners, smooth
-from gyroid_cad.tube import AREA_PER_CELL
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 
@@ -71,7 +73,7 @@ def test_corners_are_interpolated_and_edges_shared(fitted: FittedPatch) -> None:
 
 
 def test_the_fitted_mid_surface_has_the_area_of_the_gyroid(fitted: FittedPatch) -> None:
-    assert mid_surface_area(fitted) == pytest.approx(AREA_PER_CELL, rel=2e-7)
+    assert mid_surface_area(fitted) == pytest.approx(TUBE.area, rel=2e-7)
 
 
 def test_the_reported_distance_is_that_of_the_nearest_points(fitted: FittedPatch) -> None:
@@ -109,7 +111,7 @@ def test_the_reported_angle_is_in_degrees_and_the_curvature_per_cell_size(fitted
         (lambda patch: fit_report(patch).max_normal_angle, 2.3),
         (lambda patch: fit_report(patch).rms_mean_curvature, 1.8),
         (normal_error, 3.3),
-        (lambda patch: abs(mid_surface_area(patch) / AREA_PER_CELL - 1), 5.5),
+        (lambda patch: abs(mid_surface_area(patch) / TUBE.area - 1), 5.5),
     ],
     ids=["distance", "rms distance", "normal angle", "mean curvature", "fitted normals", "area"],
 )

@@ -17,10 +17,12 @@ from gyroid_cad.block_maps import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.complex import CellComplex, build_complex
 from gyroid_cad.errors import ParameterError, SoundnessError
 from gyroid_cad.exact_wall import block_volume, differentiation_matrix, exact_measures, laid_patches
+from gyroid_cad.families import USUAL
 from gyroid_cad.fields import Field, as_field
 from gyroid_cad.grading import THINNEST_WALL, Grading
 from gyroid_cad.maps import SpaceMap
-from gyroid_cad.tube import LARGEST_DENSITY, density_of_thickness
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 
@@ -126,7 +128,7 @@ def test_a_constant_scale_leaves_the_thickness_as_asked_for(scale: float) -> Non
     np.testing.assert_array_equal(thickness, 0.3 + 0.02 * FLAT_POINTS[..., 0])
     # The tube formula of a lattice that large.
     volume = exact_measures(ONE_CELL, Grading(L, 0.3, scale_field=scale)).volume
-    assert volume == pytest.approx(density_of_thickness(0.3 / (scale * L)) * (scale * L) ** 3, rel=1e-8)
+    assert volume == pytest.approx(TUBE.density(0.3 / (scale * L)) * (scale * L) ** 3, rel=1e-8)
 
 
 @pytest.mark.parametrize("name", ["thickness", "density", "scale_field"])
@@ -227,7 +229,7 @@ def test_what_cannot_be_built_is_refused_with_the_worst_place(name: str) -> None
     assert (error.parameter, error.accepted) == (parameter, accepted)
     assert isinstance(error, ParameterError)
     assert "\n" not in str(error)
-    assert error.limit == {"below": LARGEST_DENSITY, "at least": THINNEST_WALL, "above": 0}[accepted]
+    assert error.limit == {"below": TUBE.largest_density, "at least": THINNEST_WALL, "above": 0}[accepted]
     assert error.value >= error.limit if accepted == "below" else error.value <= error.limit
     if name in VALUES:
         assert error.value == pytest.approx(VALUES[name](*error.place), rel=1e-5, abs=1e-9)
@@ -247,9 +249,9 @@ def test_refusals_can_be_sent_between_processes(name: str) -> None:
 
 def test_the_thinnest_wall_and_just_under_the_largest_density_pass() -> None:
     np.testing.assert_array_equal(laid(Grading(L, field(f"{THINNEST_WALL!r} + 0*x")))[2], THINNEST_WALL)
-    laid(Grading(L, density=float(np.nextafter(LARGEST_DENSITY, 0))))
+    laid(Grading(L, density=float(np.nextafter(TUBE.largest_density, 0))))
     with pytest.raises(SoundnessError, match="the density at which the wall meets itself"):
-        laid(Grading(L, density=LARGEST_DENSITY))
+        laid(Grading(L, density=TUBE.largest_density))
 
 
 @pytest.mark.parametrize("parameter", ["thickness", "density", "scale_field"])

@@ -23,10 +23,12 @@ from OCP.TopLoc import TopLoc_Location
 
 from gyroid_cad import Lattice
 from gyroid_cad.errors import FitError, GyroidError, ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.step import read_step
-from gyroid_cad.tube import LARGEST_DENSITY, LARGEST_THICKNESS, THICKNESS_LIMIT
+
+TUBE = USUAL.tube
 
 GOOD: dict[str, Any] = {"cells": (1, 1, 1), "cell_size": 10.0, "thickness": 0.8}
 COARSE = FitSettings(5)
@@ -39,7 +41,7 @@ NUMBER_WORDS = "a finite number"
 FIELD_WORDS = "a number, an expression of x, y, z, a Field or a function"
 CELL_WORDS = "three whole numbers, each from 1 to 1000000"
 WALL_WORDS = "and below 3.7647 mm"
-DENSITY_WORDS = f"above 0 and below {LARGEST_DENSITY:.5f}"
+DENSITY_WORDS = f"above 0 and below {TUBE.largest_density:.5f}"
 BAD_CELLS = [0, -1, 1.5, True, "2", None, nan]
 
 
@@ -56,7 +58,7 @@ BAD_CELLS = [0, -1, 1.5, True, "2", None, nan]
         *(("scale_field", value, FIELD_WORDS) for value in (True, (1, 2))),
         *(
             ("thickness", value, WALL_WORDS)
-            for value in (0.0, -0.8, 1e-5, THICKNESS_LIMIT * 10, LARGEST_THICKNESS * 10, 3.765, 10.0)
+            for value in (0.0, -0.8, 1e-5, TUBE.thickness_limit * 10, TUBE.largest_thickness * 10, 3.765, 10.0)
         ),
         *(("cells", (bad, 1, 1), CELL_WORDS) for bad in BAD_CELLS),
         *(("cells", (1, 1, bad), CELL_WORDS) for bad in BAD_CELLS),
@@ -80,7 +82,7 @@ def test_a_bad_value_is_refused_in_one_line_with_its_name_and_what_is_accepted(
     [
         *((value, NUMBER_WORDS) for value in (nan, inf)),
         *((value, FIELD_WORDS) for value in (False, {0.2})),
-        *((value, DENSITY_WORDS) for value in (0.0, -0.2, LARGEST_DENSITY, 0.941, 1.0, 24.5)),
+        *((value, DENSITY_WORDS) for value in (0.0, -0.2, TUBE.largest_density, 0.941, 1.0, 24.5)),
         (1e-9, "at least 3.09e-05"),
     ],
 )
@@ -139,12 +141,12 @@ def test_the_exact_volume_goes_with_the_cells_and_the_cube_of_the_size(
 
 
 def test_anything_below_the_largest_wall_is_accepted() -> None:
-    thickest = Lattice((1, 1, 1), 10.0, float(np.nextafter(LARGEST_THICKNESS * 10.0, 0)))
-    densest = Lattice((1, 1, 1), 10.0, density=float(np.nextafter(LARGEST_DENSITY, 0)))
-    assert thickest.volume_fraction == pytest.approx(LARGEST_DENSITY)
-    assert densest.wall_thickness == pytest.approx(LARGEST_THICKNESS * 10.0)
+    thickest = Lattice((1, 1, 1), 10.0, float(np.nextafter(TUBE.largest_thickness * 10.0, 0)))
+    densest = Lattice((1, 1, 1), 10.0, density=float(np.nextafter(TUBE.largest_density, 0)))
+    assert thickest.volume_fraction == pytest.approx(TUBE.largest_density)
+    assert densest.wall_thickness == pytest.approx(TUBE.largest_thickness * 10.0)
     with pytest.raises(ParameterError):
-        Lattice((1, 1, 1), 10.0, LARGEST_THICKNESS * 10.0)
+        Lattice((1, 1, 1), 10.0, TUBE.largest_thickness * 10.0)
 
 
 def test_a_lattice_cannot_be_changed() -> None:

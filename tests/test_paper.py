@@ -15,12 +15,14 @@ from gyroid_cad import Lattice
 from gyroid_cad.complex import CellComplex, build_complex
 from gyroid_cad.errors import ParameterError, SoundnessError
 from gyroid_cad.exact_wall import exact_measures
+from gyroid_cad.families import USUAL
 from gyroid_cad.fields import Field
 from gyroid_cad.paper import PaperUnits, paper_units
 from gyroid_cad.refit import WALL_PER_TOLERANCE, fitted_nets, fitted_wall, measured
 from gyroid_cad.soundness import require_sound, require_sound_fit
 from gyroid_cad.symmetry import CELL_QUARTERS, placed_corners
-from gyroid_cad.tube import THICKNESS_LIMIT
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 Cells = tuple[int, int, int]
@@ -184,7 +186,7 @@ def test_the_first_specimen_comes_to_two_thirds_of_its_limit_at_its_far_corner()
         require_sound(complex, doubled)
     limit, place = caught.value.limit, caught.value.place
     # A little off the patch's centre, where the surface is a little flatter and the wall a little thicker.
-    assert BC_PER_CELL * THICKNESS_LIMIT <= limit <= 1.001 * BC_PER_CELL * THICKNESS_LIMIT
+    assert BC_PER_CELL * TUBE.thickness_limit <= limit <= 1.001 * BC_PER_CELL * TUBE.thickness_limit
     assert (place[0], place[1]) == pytest.approx((x[thickest], y[thickest]), abs=0.05)
     assert thickness_of(x, y).max() / limit == pytest.approx(2 / 3, abs=0.02)
 
@@ -192,4 +194,4 @@ def test_the_first_specimen_comes_to_two_thirds_of_its_limit_at_its_far_corner()
 def test_the_thickness_factor_is_the_whole_wall() -> None:
     # Read as the half it would pass the limit.
     thickest = parts("thickness")[2].asked(np.array([[6.0, 5.5, 0.75]]))[0]
-    assert thickest < BC_PER_CELL * THICKNESS_LIMIT < 2 * thickest
+    assert thickest < BC_PER_CELL * TUBE.thickness_limit < 2 * thickest

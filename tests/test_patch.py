@@ -13,18 +13,20 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 from scipy.optimize import root
 
+from gyroid_cad.families import USUAL
 from gyroid_cad.patch import (
     EDGE_HALF_TURN,
-    EDGE_HALF_TURN_SHIFT,
     PARAMETERISATIONS,
     ROTOINVERSION,
+    edge_half_turn_shift,
     exact_edge,
     parameter_corners,
     polar,
     smooth,
 )
-from gyroid_cad.symmetry import PATCH_CORNERS, QUARTER
-from gyroid_cad.tube import AREA_PER_CELL
+from gyroid_cad.symmetry import QUARTER
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +65,9 @@ def sampled() -> Sampled:
 @pytest.mark.parametrize("name", PARAMETERISATIONS)
 def test_corners_lie_on_the_grid_of_quarters(name: str) -> None:
     points, _ = PARAMETERISATIONS[name](*parameter_corners().T)
-    np.testing.assert_allclose(points, PATCH_CORNERS * QUARTER, rtol=0, atol=1e-7 if name == "polar" else 1e-15)
+    np.testing.assert_allclose(
+        points, USUAL.patch.corner_array * QUARTER, rtol=0, atol=1e-7 if name == "polar" else 1e-15
+    )
 
 
 @pytest.mark.parametrize("name", PARAMETERISATIONS)
@@ -81,14 +85,14 @@ def test_the_half_turn_is_one_about_the_normal_at_the_middle_of_edge_3() -> None
     np.testing.assert_array_equal(EDGE_HALF_TURN @ EDGE_HALF_TURN, np.eye(3))
     assert np.trace(EDGE_HALF_TURN) == -1
     np.testing.assert_allclose(EDGE_HALF_TURN @ normal, normal, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(EDGE_HALF_TURN @ middle + EDGE_HALF_TURN_SHIFT, middle, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(EDGE_HALF_TURN @ middle + edge_half_turn_shift(), middle, rtol=0, atol=1e-15)
 
 
 @settings(max_examples=50, deadline=None)
 @given(SQUARE)
 def test_the_half_turn_reverses_edge_3(along: float) -> None:
     there, back = exact_edge([along, -along])
-    np.testing.assert_allclose(EDGE_HALF_TURN @ there + EDGE_HALF_TURN_SHIFT, back, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(EDGE_HALF_TURN @ there + edge_half_turn_shift(), back, rtol=0, atol=1e-14)
 
 
 @settings(max_examples=50, deadline=None)
@@ -170,7 +174,7 @@ def test_mean_curvature_vanishes(sampled: Sampled) -> None:
 
 def test_24_patches_have_the_area_of_a_cell(sampled: Sampled) -> None:
     area = np.sum(sampled.weights * np.linalg.norm(sampled.area_vectors, axis=-1))
-    assert area * PATCHES_PER_CELL * AREAS_PER_CELL_SIZE_SQUARED == pytest.approx(AREA_PER_CELL, rel=1e-12)
+    assert area * PATCHES_PER_CELL * AREAS_PER_CELL_SIZE_SQUARED == pytest.approx(TUBE.area, rel=1e-12)
 
 
 def test_24_patches_have_total_curvature_minus_16_pi(sampled: Sampled) -> None:
@@ -182,7 +186,7 @@ def test_quadrature_of_the_smooth_patch_converges_geometrically() -> None:
     def area_error(count: int) -> float:
         coarse = Sampled(count)
         area = np.sum(coarse.weights * np.linalg.norm(coarse.area_vectors, axis=-1))
-        return abs(float(area) * PATCHES_PER_CELL * AREAS_PER_CELL_SIZE_SQUARED - AREA_PER_CELL)
+        return abs(float(area) * PATCHES_PER_CELL * AREAS_PER_CELL_SIZE_SQUARED - TUBE.area)
 
     errors = [area_error(count) for count in (8, 12, 16, 20)]
     assert all(later < earlier / 20 for earlier, later in pairwise(errors))

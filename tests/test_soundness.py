@@ -19,6 +19,7 @@ from gyroid_cad.block_maps import parse_map
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import SoundnessError
 from gyroid_cad.exact_wall import laid_patches
+from gyroid_cad.families import USUAL
 from gyroid_cad.fields import Field, as_field
 from gyroid_cad.grading import THINNEST_WALL, Grading
 from gyroid_cad.maps import SpaceMap
@@ -26,8 +27,9 @@ from gyroid_cad.nurbs import grid_derivatives
 from gyroid_cad.refit import fitted_wall
 from gyroid_cad.soundness import require_sound, require_sound_fit
 from gyroid_cad.symmetry import CELL_QUARTERS, placed_corners
-from gyroid_cad.tube import THICKNESS_LIMIT
 from gyroid_cad.wall import Wall
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 Cells = tuple[int, int, int]
@@ -86,7 +88,7 @@ def patch_centres(cells: Cells) -> Floats:
 
 def test_a_uniform_field_is_limited_as_the_uniform_wall_at_a_patch_centre() -> None:
     error = refused(Grading(L, field("4 + 0*x")), (2, 1, 1))
-    assert error.limit == pytest.approx(THICKNESS_LIMIT * L, rel=1e-6)
+    assert error.limit == pytest.approx(TUBE.thickness_limit * L, rel=1e-6)
     assert error.value == 4
     assert np.linalg.norm(patch_centres((2, 1, 1)) - error.place, axis=1).min() < 1e-9
     assert (error.parameter, error.accepted, error.unit) == ("thickness", "below", " mm")
@@ -107,7 +109,7 @@ def test_the_limit_scales_with_space_and_not_with_motions(scale: float, angles: 
     turn = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     for varied in ({"scale_field": scale}, {"map": affine(scale * turn, (3, -40, 7))}):
         error = refused(Grading(L, 4 * scale, **varied))
-        assert error.limit == pytest.approx(scale * THICKNESS_LIMIT * L, rel=1e-6)
+        assert error.limit == pytest.approx(scale * TUBE.thickness_limit * L, rel=1e-6)
 
 
 LIMITED: dict[str, tuple[Graded, Cells]] = {
@@ -263,7 +265,7 @@ def test_a_wall_that_passes_does_not_fold_anywhere(spelling: str, part: float) -
 
 
 def test_what_folds_is_seen_to_fold() -> None:
-    grading = Grading(L, 1.02 * THICKNESS_LIMIT * L)
+    grading = Grading(L, 1.02 * TUBE.thickness_limit * L)
     assert least_area(fitted_wall(build_complex(ONE), grading, 16)) < 0
 
 

@@ -10,15 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gyroid_cad.bounding_cells import bounding_cell
+from gyroid_cad.families import USUAL
 from gyroid_cad.patch import smooth
-from gyroid_cad.symmetry import (
-    CELL_QUARTERS,
-    QUARTER,
-    Placements,
-    bounding_cell,
-    cubic_cell,
-    placed_corners,
-)
+from gyroid_cad.symmetry import CELL_QUARTERS, QUARTER, Placements, placed_corners
 
 Floats = NDArray[np.float64]
 EdgeUses = dict[object, list[tuple[int, int]]]
@@ -44,14 +39,10 @@ def periodic_patches(placements: Placements) -> set[frozenset[tuple[int, ...]]]:
 
 def as_printed() -> Placements:
     """Eq. (19) as the paper prints it: B2 = T_y B + A(1, 0, 1)."""
-    cell, first = cubic_cell(), bounding_cell()
+    cell, first = USUAL.cell, bounding_cell(USUAL.patch)
     second = first.transformed(MIRROR_Y, (4, 4, 8))
     keep = cell.bounding_cell != 1
-    return Placements(
-        np.concatenate([cell.matrices[keep], second.matrices]),
-        np.concatenate([cell.translations[keep], second.translations]),
-        np.concatenate([cell.bounding_cell[keep], np.ones(6)]),
-    )
+    return Placements(cell.patch, cell.matrices[keep], cell.translations[keep], cell.bounding_cell[keep]).joined(second)
 
 
 def placed_edge(placements: Placements, patch: int, k: int) -> tuple[Floats, Floats]:
@@ -64,7 +55,7 @@ def placed_edge(placements: Placements, patch: int, k: int) -> tuple[Floats, Flo
 
 
 def test_the_six_placements_of_a_bounding_cell_are_the_powers_of_one_map_of_order_six() -> None:
-    cell = bounding_cell()
+    cell = bounding_cell(USUAL.patch)
     step = cell.matrices[1] @ cell.matrices[0].T
     shift = cell.translations[1] - step @ cell.translations[0]
     matrix, translation = np.eye(3), np.zeros(3)
@@ -77,17 +68,17 @@ def test_the_six_placements_of_a_bounding_cell_are_the_powers_of_one_map_of_orde
 
 
 def test_six_patches_meet_in_the_middle_of_the_bounding_cell() -> None:
-    for corners in placed_corners(bounding_cell()):
+    for corners in placed_corners(bounding_cell(USUAL.patch)):
         assert [2, 2, 2] in corners.tolist()
 
 
 def test_placements_are_signed_permutations() -> None:
-    matrices = cubic_cell().matrices
+    matrices = USUAL.cell.matrices
     np.testing.assert_array_equal(matrices @ np.swapaxes(matrices, 1, 2), np.broadcast_to(np.eye(3), (24, 3, 3)))
 
 
 def test_bounding_cells_fill_every_other_place_of_the_cubic_cell() -> None:
-    cell = cubic_cell()
+    cell = USUAL.cell
     places = []
     for k in range(4):
         uses = Counter(map(tuple, placed_corners(cell)[cell.bounding_cell == k].reshape(-1, 3).tolist()))
@@ -100,26 +91,26 @@ def test_bounding_cells_fill_every_other_place_of_the_cubic_cell() -> None:
 
 
 def test_the_24_patches_of_a_cell_are_distinct_in_the_periodic_lattice() -> None:
-    assert len(cubic_cell()) == 24
-    assert len(periodic_patches(cubic_cell())) == 24
+    assert len(USUAL.cell) == 24
+    assert len(periodic_patches(USUAL.cell)) == 24
 
 
 def test_every_edge_of_the_periodic_lattice_belongs_to_two_patches() -> None:
-    assert Counter(map(len, periodic_edges(cubic_cell()).values())) == {2: 48}
+    assert Counter(map(len, periodic_edges(USUAL.cell).values())) == {2: 48}
 
 
 def test_the_euler_characteristic_of_a_cell_is_minus_8() -> None:
-    corners = {tuple(c) for c in placed_corners(cubic_cell()).reshape(-1, 3) % CELL_QUARTERS}
-    assert len(corners) - len(periodic_edges(cubic_cell())) + len(periodic_patches(cubic_cell())) == -8
+    corners = {tuple(c) for c in placed_corners(USUAL.cell).reshape(-1, 3) % CELL_QUARTERS}
+    assert len(corners) - len(periodic_edges(USUAL.cell)) + len(periodic_patches(USUAL.cell)) == -8
 
 
 def test_six_patches_meet_at_every_corner_of_the_periodic_lattice() -> None:
-    uses = Counter(tuple(c) for c in placed_corners(cubic_cell()).reshape(-1, 3) % CELL_QUARTERS)
+    uses = Counter(tuple(c) for c in placed_corners(USUAL.cell).reshape(-1, 3) % CELL_QUARTERS)
     assert set(uses.values()) == {6}
 
 
 def test_placed_edges_coincide_and_their_normals_point_to_the_same_side() -> None:
-    placements = cubic_cell()
+    placements = USUAL.cell
     period = CELL_QUARTERS * QUARTER
     for (first, k), (second, m) in periodic_edges(placements).values():
         points, normals = placed_edge(placements, first, k)
@@ -130,7 +121,7 @@ def test_placed_edges_coincide_and_their_normals_point_to_the_same_side() -> Non
 
 
 def test_half_of_the_placements_carry_the_normal_to_the_other_side() -> None:
-    sides = cubic_cell().sides
+    sides = USUAL.cell.sides
     assert set(sides.tolist()) == {-1, 1}
     assert sides.sum() == 0
 
@@ -148,11 +139,11 @@ def test_transforming_placements_transforms_their_corners(
     order: list[int], signs: tuple[int, int, int], shift: tuple[int, int, int]
 ) -> None:
     matrix = np.eye(3, dtype=np.int64)[order] * np.array(signs)
-    moved = cubic_cell().transformed(matrix, shift)
-    np.testing.assert_array_equal(placed_corners(moved), placed_corners(cubic_cell()) @ matrix.T + np.array(shift))
+    moved = USUAL.cell.transformed(matrix, shift)
+    np.testing.assert_array_equal(placed_corners(moved), placed_corners(USUAL.cell) @ matrix.T + np.array(shift))
     assert set(map(len, periodic_edges(moved).values())) == {2}
 
 
 def test_placements_are_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
-        cubic_cell().matrices[0] = 0
+        USUAL.cell.matrices[0] = 0

@@ -11,13 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gyroid_cad.bounding_cells import bounding_cell
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import FitError, ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings, fit_patch, largest_offset
 from gyroid_cad.nurbs import NurbsSurface, basis, gauss_points
-from gyroid_cad.symmetry import CELL_QUARTERS, Placements, bounding_cell, cubic_cell
-from gyroid_cad.tube import density_of_thickness, face_area
+from gyroid_cad.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall import SIDES, Wall, build_wall
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 
@@ -77,20 +80,20 @@ def densely(surface: NurbsSurface, count: int) -> Floats:
 @pytest.mark.parametrize("relative_thickness", [0.01, 0.05, 0.1, 0.2, 0.3, 0.37])
 def test_volume_and_face_areas_of_a_period_are_those_of_the_tube_formula(relative_thickness: float) -> None:
     wall = wall_of((1, 1, 1), relative_thickness)
-    assert wall.volume() == pytest.approx(density_of_thickness(relative_thickness) * CELL_SIZE**3, rel=4e-7)
+    assert wall.volume() == pytest.approx(TUBE.density(relative_thickness) * CELL_SIZE**3, rel=4e-7)
     nodes, weights = gauss_points(wall.knots, 6)
     for side in SIDES:
         area = 0.0
         for net in range(len(wall.nets)):
             d = wall.face(net, side).derivatives(nodes[:, np.newaxis], nodes)
             area += weights @ np.linalg.norm(np.cross(d[1, 0], d[0, 1]), axis=-1) @ weights
-        assert area == pytest.approx(face_area(relative_thickness) * CELL_SIZE**2, rel=1e-5)
+        assert area == pytest.approx(TUBE.face_area(relative_thickness) * CELL_SIZE**2, rel=1e-5)
 
 
 def test_volume_error_falls_fast_with_the_fit() -> None:
     def error(n: int) -> float:
         wall = build_wall(build_complex((1, 1, 1)), fit_patch(FitSettings(n)), 1.0, 0.1)
-        return abs(wall.volume() / density_of_thickness(0.1) - 1)
+        return abs(wall.volume() / TUBE.density(0.1) - 1)
 
     assert np.log(error(8) / error(14)) / np.log(11 / 5) > 3.3
 
@@ -206,8 +209,8 @@ def test_the_bounding_box_holds_the_wall_tightly(cells: tuple[int, int, int]) ->
 
 def test_the_bounding_box_is_tight_where_the_extremes_lie_nowhere_special() -> None:
     # In these directions one patch reaches furthest somewhere along its edges, between samples.
-    cell = cubic_cell()
-    one = Placements(cell.matrices[:1], cell.translations[:1], cell.bounding_cell[:1])
+    cell = USUAL.cell
+    one = Placements(cell.patch, cell.matrices[:1], cell.translations[:1], cell.bounding_cell[:1])
     upright = build_wall(build_complex((1, 1, 1), one), fit_patch(), CELL_SIZE, THICKNESS)
     turn = np.array([[0.77, 0.08, -0.63], [-0.13, 0.59, 0.8], [0.16, -0.82, 0.55]])
     wall = replace(upright, nets=upright.nets @ turn.T)
@@ -224,7 +227,7 @@ def test_patches_of_other_cells_are_translates_by_whole_cells() -> None:
 
 
 def test_moved_placements_move_the_wall() -> None:
-    moved = cubic_cell().transformed(np.eye(3, dtype=np.int64), (1, -2, 3))
+    moved = USUAL.cell.transformed(np.eye(3, dtype=np.int64), (1, -2, 3))
     wall = build_wall(build_complex((1, 1, 1), moved), fit_patch(), CELL_SIZE, THICKNESS)
     shift = np.array([1, -2, 3]) * CELL_SIZE / CELL_QUARTERS
     np.testing.assert_allclose(wall.nets, wall_of().nets + shift, rtol=0, atol=1e-14 * CELL_SIZE)
@@ -243,11 +246,11 @@ def test_rational_patches_make_a_closed_wall_too() -> None:
     paper = FitSettings.paper()
     patch = fit_patch(FitSettings(10, paper.knots, paper.weights, "smooth"))
     # A quarter of a period: as exact as a whole one, and quicker.
-    wall = build_wall(build_complex((1, 1, 1), bounding_cell()), patch, 1.0, 0.1)
+    wall = build_wall(build_complex((1, 1, 1), bounding_cell(USUAL.patch)), patch, 1.0, 0.1)
     area_vector, volume = enclosed(wall)
     np.testing.assert_allclose(area_vector, 0, atol=1e-9)
     assert wall.volume() == pytest.approx(volume, rel=1e-9)
-    assert volume == pytest.approx(density_of_thickness(0.1) / 4, rel=2e-4)
+    assert volume == pytest.approx(TUBE.density(0.1) / 4, rel=2e-4)
 
 
 def test_a_fit_that_shares_no_edges_makes_no_wall() -> None:

@@ -8,6 +8,7 @@ curve or surface inside the edge or face.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
@@ -33,7 +34,7 @@ from gyroid_cad.wall import SIDES, Wall
 
 __all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise", "realise_faces", "realise_patches"]
 
-KernelShape = TopoDS_Shape
+KernelShape: TypeAlias = TopoDS_Shape
 
 # Where the patch's corners are in its control net.
 _CORNER_INDEX = ((0, 0), (-1, 0), (-1, -1), (0, -1))

@@ -21,11 +21,13 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import KernelError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.check import Topology, enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.solid import realise
-from gyroid_cad.tube import density_of_thickness
 from gyroid_cad.wall import build_wall
+
+TUBE = USUAL.tube
 
 Cells = tuple[int, int, int]
 
@@ -68,7 +70,7 @@ def nurbs_box(corner: tuple[float, float, float], sides: tuple[float, float, flo
 def test_the_enclosed_volume_is_that_of_the_tube_formula_for_each_cell(cells: Cells, relative_thickness: float) -> None:
     volume = enclosed_volume(solid_of(cells, relative_thickness, FitSettings()))
     count = cells[0] * cells[1] * cells[2]
-    assert volume == pytest.approx(count * density_of_thickness(relative_thickness) * CELL_SIZE**3, rel=2e-6)
+    assert volume == pytest.approx(count * TUBE.density(relative_thickness) * CELL_SIZE**3, rel=2e-6)
 
 
 @pytest.mark.parametrize(("cells", "fit"), [((1, 1, 1), FitSettings()), ((2, 2, 1), COARSE)])

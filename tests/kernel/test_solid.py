@@ -32,15 +32,18 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
+from gyroid_cad.bounding_cells import bounding_cell
 from gyroid_cad.complex import build_complex
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.check import enclosed_volume, topology
 from gyroid_cad.kernel.solid import TOLERANCE, another_handle, realise
 from gyroid_cad.kernel.surfaces import kernel_surface
 from gyroid_cad.patch import smooth
-from gyroid_cad.symmetry import CELL_QUARTERS, QUARTER, Placements, bounding_cell, cubic_cell
-from gyroid_cad.tube import EULER_CHARACTERISTIC
+from gyroid_cad.symmetry import CELL_QUARTERS, QUARTER, Placements
 from gyroid_cad.wall import SIDES, Wall, build_wall
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 Cells = tuple[int, int, int]
@@ -65,7 +68,7 @@ def solid_of(cells: Cells, fit: FitSettings = COARSE, placements: Placements | N
 @lru_cache(maxsize=1)
 def sorted_into_the_cell() -> Placements:
     """The same lattice, each patch moved by whole cells until its centre is in the cell: some then hang by a line."""
-    placements = cubic_cell()
+    placements = USUAL.cell
     return replace(placements, translations=placements.translations % CELL_QUARTERS)
 
 
@@ -142,7 +145,7 @@ def test_a_cell_among_others_adds_twice_minus_eight_to_the_euler_characteristic(
     """
     blocks = list(product((1, 2), repeat=3))
     total = sum((-1) ** (6 - sum(cells)) * euler_characteristic(solid_of(cells)) for cells in blocks)
-    assert total == 2 * EULER_CHARACTERISTIC
+    assert total == 2 * TUBE.euler_characteristic
 
 
 @pytest.mark.parametrize("cells", [ONE_CELL, (2, 1, 1)])
@@ -178,7 +181,7 @@ def sewn(wall: Wall) -> BRepBuilderAPI_Sewing:
 
 
 def test_sewing_the_faces_of_a_bounding_cell_gives_the_same_solid() -> None:
-    placements = bounding_cell()
+    placements = bounding_cell(USUAL.patch)
     wall, built = wall_of(ONE_CELL, COARSE, placements), solid_of(ONE_CELL, COARSE, placements)
     assert wall.complex.pinch_lines == 0
     sewing = sewn(wall)
@@ -197,7 +200,7 @@ def test_a_sewing_tool_finds_no_edge_without_a_partner(cells: Cells) -> None:
 
 def test_the_papers_weights_and_knots_make_a_valid_solid_of_rational_faces() -> None:
     """Of a bounding cell, for the kernel takes long to check rational faces."""
-    placements = bounding_cell()
+    placements = bounding_cell(USUAL.patch)
     wall, solid = (made(ONE_CELL, PAPER_WEIGHTS, placements) for made in (wall_of, solid_of))
     surfaces = surfaces_of(solid)
     faces = [surface for surface in surfaces if surface.VDegree() == 3]
@@ -230,7 +233,7 @@ def test_a_patch_that_hangs_by_a_line_becomes_a_plate_with_the_topology_of_a_box
     solids = parts(solid_of(ONE_CELL, COARSE, sorted_into_the_cell()), TopAbs_SOLID)
     plate = min(solids, key=enclosed_volume)
     assert [distinct(plate, kind) for kind in (TopAbs_VERTEX, TopAbs_EDGE, TopAbs_FACE)] == [8, 12, 6]
-    assert sum(map(enclosed_volume, solids)) == pytest.approx(len(cubic_cell()) * enclosed_volume(plate), rel=1e-12)
+    assert sum(map(enclosed_volume, solids)) == pytest.approx(len(USUAL.cell) * enclosed_volume(plate), rel=1e-12)
 
 
 @pytest.mark.parametrize("placements", [None, sorted_into_the_cell()], ids=["a solid", "a compound"])
@@ -253,7 +256,7 @@ def test_translated_copies_of_a_patch_share_their_geometry_in_the_kernel() -> No
         BRep_Tool.Surface_s(TopoDS.Face_s(f), TopLoc_Location()) for f in parts(solid_of((3, 2, 2)), TopAbs_FACE)
     ]
     faces = {id(surface) for surface in surfaces if surface.VDegree() == 3}
-    assert len(faces) == len(SIDES) * len(cubic_cell())
+    assert len(faces) == len(SIDES) * len(USUAL.cell)
 
 
 @pytest.mark.parametrize(("control_points", "relative_error"), [(5, 3e-2), (10, 5e-4), (16, 5e-5)])
@@ -264,7 +267,7 @@ def test_a_line_along_the_exact_normal_passes_through_one_thickness_of_wall(
     solid = another_handle(solid_of(ONE_CELL, FitSettings(control_points)))
     shooter = IntCurvesFace_ShapeIntersector()
     shooter.Load(solid, TOLERANCE)
-    placements, random = cubic_cell(), np.random.default_rng(control_points)
+    placements, random = USUAL.cell, np.random.default_rng(control_points)
     for matrix, translation in zip(placements.matrices, placements.translations, strict=True):
         points, normals = smooth(*random.uniform(-0.99, 0.99, (2, 4)))
         placed = (points @ matrix.T + translation * QUARTER) * CELL_SIZE / 2

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ExportError, ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.formats import SCHEMAS, require_schema
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
@@ -24,7 +25,7 @@ from gyroid_cad.kernel.solid import TOLERANCE, realise
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.limits import LARGEST_CELL, SMALLEST_CELL
-from gyroid_cad.symmetry import CELL_QUARTERS, cubic_cell
+from gyroid_cad.symmetry import CELL_QUARTERS
 from gyroid_cad.wall import build_wall
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
@@ -213,7 +214,7 @@ def test_the_schema_is_the_one_asked_for_whatever_was_written_before(
 
 
 def test_pieces_come_back_as_solids_of_their_own(tmp_path: Path) -> None:
-    placements = cubic_cell()
+    placements = USUAL.cell
     scattered = replace(placements, translations=placements.translations % CELL_QUARTERS)
     wall = build_wall(build_complex((1, 1, 1), scattered), fit_patch(FitSettings(4)), 10.0, 0.8)
     write_step(realise(wall), tmp_path / "pieces.step")

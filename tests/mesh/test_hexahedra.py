@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 from gyroid_cad import Cylinder, Lattice
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.mesh.hexahedra import Mesh, hexahedra, quadrilaterals
 from gyroid_cad.mesh.places import FACE_A, FACE_B, FREE_WALLS
-from gyroid_cad.tube import face_area
+
+TUBE = USUAL.tube
 
 SIZE, THICKNESS = 10.0, 1.0
 COARSE = FitSettings(6)
@@ -76,7 +78,7 @@ def area_and_outflow(mesh: Mesh, name: str) -> tuple[float, float]:
 
 def test_the_area_of_each_face_follows_the_tube_formula() -> None:
     mesh = hexahedra(lattice(fit=FitSettings()).wall(), 24)
-    exact = face_area(THICKNESS / SIZE) * SIZE**2
+    exact = TUBE.face_area(THICKNESS / SIZE) * SIZE**2
     for name in (FACE_A, FACE_B):
         assert area_and_outflow(mesh, name)[0] == pytest.approx(exact, rel=1e-3)
 

@@ -13,12 +13,14 @@ from scipy.sparse.linalg import spsolve
 from volume_cases import CELL_SIZE, constant_wall, volumes_named, wall_named
 from volume_readers import FREE, SIDE_0, SIDE_1, Multipatch, Problem, solved, u_fastest
 
+from gyroid_cad.bounding_cells import bounding_cell
 from gyroid_cad.complex import build_complex
+from gyroid_cad.families import USUAL
 from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.mesh.volumes import periodic_points, wall_volumes
-from gyroid_cad.symmetry import bounding_cell
-from gyroid_cad.tube import face_area
 from gyroid_cad.wall import Wall, build_wall
+
+TUBE = USUAL.tube
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +41,9 @@ def test_mfem_solves_for_linear_functions_exactly(kind: str, degree: int, tmp_pa
 
 def bounding_cell_wall(points: int, thickness: float, cell_size: float = 2.0) -> Wall:
     """Six patches that meet in a corner."""
-    return build_wall(build_complex((1, 1, 1), bounding_cell()), fit_patch(FitSettings(points)), cell_size, thickness)
+    return build_wall(
+        build_complex((1, 1, 1), bounding_cell(USUAL.patch)), fit_patch(FitSettings(points)), cell_size, thickness
+    )
 
 
 def test_solutions_on_cubic_patches_converge_at_order_four(tmp_path: Path) -> None:
@@ -89,10 +93,10 @@ def test_heat_through_the_wall_is_conserved_and_bounded_by_the_areas_of_its_face
     # Were temperature a function of the distance s alone, heat would have A(s) to pass there: no less than flows.
     # No more than flows would if the whole wall were as narrow as its faces.
     s, weights = np.polynomial.legendre.leggauss(12)
-    areas = np.array([face_area(abs(place) * relative_thickness) for place in s]) * CELL_SIZE**2
+    areas = np.array([TUBE.face_area(abs(place) * relative_thickness) for place in s]) * CELL_SIZE**2
     most, least = (
         1 / (thickness / 2 * np.sum(weights / areas)),
-        face_area(relative_thickness) * CELL_SIZE**2 / thickness,
+        TUBE.face_area(relative_thickness) * CELL_SIZE**2 / thickness,
     )
     assert least < through[1] < most < through[0]
     assert through[1] == pytest.approx(most, rel=1e-4)

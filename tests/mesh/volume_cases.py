@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from gyroid_cad import Cylinder, FitSettings, Lattice, fit_patch, linear
+from gyroid_cad.bounding_cells import bounding_cell
 from gyroid_cad.complex import build_complex
+from gyroid_cad.families import USUAL
 from gyroid_cad.mesh.volumes import VolumePatches, wall_volumes
-from gyroid_cad.symmetry import Placements, bounding_cell, cubic_cell
+from gyroid_cad.symmetry import Placements
 from gyroid_cad.wall import Wall, build_wall
 
 CELL_SIZE = 10.0
@@ -21,9 +23,9 @@ TURN = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, -1]])
 
 def turned_placements() -> Placements:
     """The patches of a cell where they are, each third one with its parameters turned by a right angle."""
-    cell = cubic_cell()
+    cell = USUAL.cell
     matrices = np.array([matrix @ TURN if k % 3 == 0 else matrix for k, matrix in enumerate(cell.matrices)])
-    return Placements(matrices, cell.translations, cell.bounding_cell)
+    return Placements(cell.patch, matrices, cell.translations, cell.bounding_cell)
 
 
 def constant_wall(
@@ -39,7 +41,7 @@ def constant_wall(
 def rational_wall() -> Wall:
     paper = FitSettings.paper()
     patch = fit_patch(FitSettings(10, paper.knots, paper.weights, "smooth"))
-    return build_wall(build_complex((1, 1, 1), bounding_cell()), patch, CELL_SIZE, 0.08 * CELL_SIZE)
+    return build_wall(build_complex((1, 1, 1), bounding_cell(USUAL.patch)), patch, CELL_SIZE, 0.08 * CELL_SIZE)
 
 
 def coarse(cells: tuple[int, int, int], **given: Any) -> Wall:

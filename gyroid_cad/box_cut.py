@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from gyroid_cad.box_caps import Cap, CapArc, caps_of
 from gyroid_cad.complex import connected
 from gyroid_cad.errors import KernelError
+from gyroid_cad.quadrature import SquareQuadrature
 from gyroid_cad.sections import PLANES, Faces, Sections
-from gyroid_cad.trimming import CORNER, RIM, Arc, CutFace, Node, SquareQuadrature, cut_faces
+from gyroid_cad.trimming import CORNER, RIM, Arc, CutFace, Node, cut_faces
 from gyroid_cad.wall import Wall
 
 __all__ = ["Box", "BoxEdge", "BoxFace", "BoxedWall", "cut_to_box"]

@@ -36,7 +36,7 @@ ROWS = [
     ["complex"],
     ["wall"],
     ["exact_wall"],
-    ["soundness", "refit", "covering", "sections"],
+    ["soundness", "refit", "covering", "sections", "quadrature", "loops"],
     ["trimming"],
     ["box_caps"],
     ["box_cut"],

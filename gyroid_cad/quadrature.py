@@ -15,6 +15,7 @@ from gyroid_cad.nurbs import gauss_points, grid_derivatives
 __all__ = ["SquareQuadrature"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # The flux through a cubic face without weights has degree 8 along each side.
 _PER_SPAN = 9
@@ -81,7 +82,7 @@ class SquareQuadrature:
         along_u = before[span_u, span_v] + np.einsum("mp,mpqk->mqk", up_to, blocks[span_u, :, span_v])
         return np.asarray(np.einsum("m,mq,mqk->k", rates, at, along_u))
 
-    def _functions(self, x: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
+    def _functions(self, x: Floats) -> tuple[Integers, Floats, Floats]:
         """Which span x is in; there Lagrange's polynomials on its nodes, and their integrals from its start to x."""
         span = np.clip(np.searchsorted(self.breaks, x, side="right") - 1, 0, len(self.breaks) - 2)
         half = np.diff(self.breaks)[span] / 2
@@ -90,4 +91,5 @@ class SquareQuadrature:
         integrals = np.empty_like(legendre[:, :-1])
         integrals[:, 0] = local + 1
         integrals[:, 1:] = (legendre[:, 2:] - legendre[:, :-2]) / (2 * np.arange(1, _PER_SPAN) + 1)
-        return span, legendre[:, :-1] @ self._coefficients.T, half[:, np.newaxis] * (integrals @ self._coefficients.T)
+        values, sums = legendre[:, :-1] @ self._coefficients.T, integrals @ self._coefficients.T
+        return span.astype(np.int64), np.asarray(values), np.asarray(half[:, np.newaxis] * sums)

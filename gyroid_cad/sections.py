@@ -85,28 +85,32 @@ class Faces:
         -------
         points, du, dv : ndarray, shape (m, q, 3)
         """
-        n = len(self.weights)
-        nets = self.nets[which]
-        homogeneous = np.concatenate(
-            [
-                nets * self.weights[..., np.newaxis],
-                np.broadcast_to(self.weights[..., np.newaxis], (*nets.shape[:3], 1)),
-            ],
-            axis=-1,
-        ).reshape(len(which), n, n * 4)
-        along = [[basis(self.knots, 3, x.ravel(), k).reshape(*x.shape, n) for k in (0, 1)] for x in (u, v)]
-        rows, rows_u = ((b @ homogeneous).reshape(*u.shape, n, 4) for b in along[0])
+        along_u, along_v = ([self._functions(x, k) for k in (0, 1)] for x in (u, v))
+        homogeneous = self._homogeneous(which)
         point, du, dv = (
-            np.einsum("mqjc,mqj->mqc", row, b)
-            for row, b in ((rows, along[1][0]), (rows_u, along[1][0]), (rows, along[1][1]))
+            _products(homogeneous, *pair)
+            for pair in ((along_u[0], along_v[0]), (along_u[1], along_v[0]), (along_u[0], along_v[1]))
         )
         weight = point[..., 3:]
         place = point[..., :3] / weight
         return place, (du[..., :3] - du[..., 3:] * place) / weight, (dv[..., :3] - dv[..., 3:] * place) / weight
 
+    def points(self, which: Integers, u: Floats, v: Floats) -> Floats:
+        """Points of chosen faces alone; shape (m, q, 3)."""
+        point = _products(self._homogeneous(which), self._functions(u, 0), self._functions(v, 0))
+        return np.asarray(point[..., :3] / point[..., 3:])
+
+    def _homogeneous(self, which: Integers) -> Floats:
+        weights = self.weights[..., np.newaxis]
+        nets = self.nets[which]
+        return np.concatenate([nets * weights, np.broadcast_to(weights, (*nets.shape[:3], 1))], axis=-1)
+
+    def _functions(self, x: Floats, derivative: int) -> Floats:
+        return basis(self.knots, 3, x.ravel(), derivative).reshape(*x.shape, -1)
+
     def heights(self, which: Integers, u: Floats, v: Floats) -> Floats:
         """How far points lie on the kept side of every plane, in mm; shape (m, q, 6), infinite for planes not near."""
-        points = self.derivatives(which, u, v)[0]
+        points = self.points(which, u, v)
         heights = _SIGNS * (points[..., _AXES] - self.levels[which][:, np.newaxis])
         return np.where(np.isnan(heights), np.inf, heights)
 
@@ -188,6 +192,12 @@ def _on_section(control: Floats, t: Floats, derivative: int) -> Floats:
 def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
     """Most curves are looked at in the same places: at evenly spread ones, or at Gauss points from end to end."""
     return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
+
+
+def _products(nets: Floats, along_u: Floats, along_v: Floats) -> Floats:
+    """Sums over nets (m, n, n, 4) of functions (m, q, n) along u and v; shape (m, q, 4)."""
+    rows = (along_u @ nets.reshape(*nets.shape[:2], -1)).reshape(*along_u.shape[:2], *nets.shape[2:])
+    return np.asarray(np.einsum("mqjc,mqj->mqc", rows, along_v))
 
 
 def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:
@@ -378,7 +388,7 @@ def _fitted(
     control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
     between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
     astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
-    exact = faces.derivatives(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))[0]
+    exact = faces.points(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))
     deviation = np.linalg.norm(exact - between[..., 2:], axis=-1).max(axis=1)
     return control[..., :2], control[..., 2:], np.where(crowded | astray, np.inf, deviation)
 
@@ -390,7 +400,7 @@ def _onto_level(faces: Faces, face: Integers, plane: Integers, stations: Floats)
         stations[:, 1:-1] += step[:, 1:-1]
         if np.max(np.abs(step[:, 1:-1])) < 1e-13:
             break
-    points = faces.derivatives(face, stations[..., 0], stations[..., 1])[0]
+    points = faces.points(face, stations[..., 0], stations[..., 1])
     points[np.arange(len(face)), :, _AXES[plane]] = faces.levels[face, plane][:, np.newaxis]
     return points
 

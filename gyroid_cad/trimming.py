@@ -174,11 +174,11 @@ class _Cutting:
     def run(self) -> list[CutFace]:
         quadrature = SquareQuadrature(self.faces.knots)
         densities = quadrature.densities(self.faces.nets, self.faces.weights)
+        found = [self._edge_points(curves) for curves in self.curves]
+        arcs = [self._arcs(face, on_curves) for face, (_, _, on_curves) in enumerate(found)]
         cut = []
-        for face, curves in enumerate(self.curves):
-            points, edges, on_curves = self._edge_points(curves)
-            arcs = self._arcs(face, curves, on_curves)
-            kept = [arc for arc, keep in zip(arcs, self._in_box(face, curves, arcs), strict=True) if keep]
+        for face, (curves, kept) in enumerate(zip(self.curves, self._in_box(arcs), strict=True)):
+            points, edges, _ = found[face]
             pieces = [
                 self._measured(curves, loops, quadrature, densities[face]) for loops in self._pieces(curves, kept)
             ]
@@ -250,7 +250,7 @@ class _Cutting:
             root = np.clip(root - miss / self.sections.in_space(curve, root, 1)[each, axis], low, high)
         return [(others[k], float(value)) for k, value in zip(which.tolist(), root, strict=True)]
 
-    def _arcs(self, face: int, curves: list[int], on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
+    def _arcs(self, face: int, on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
         """All stretches of the square's sides and of the section curves, between the places where they meet."""
         arcs = []
         node_of: dict[int, Node] = {}
@@ -264,20 +264,29 @@ class _Cutting:
                 (CORNER, (side + 1) % 4, 0),
             ]
             arcs += _stretches(side, -1, stops, nodes)
-        for index, curve in enumerate(curves):
+        for index, curve in enumerate(self.curves[face]):
             stops = [0.0, *(t for t, _ in on_curves[index]), 1.0]
             ends = node_of[int(self.sections.start[curve])], node_of[int(self.sections.end[curve])]
             nodes = [ends[0], *((BOX, k, 0) for _, k in on_curves[index]), ends[1]]
             arcs += _stretches(-1, index, stops, nodes)
         return arcs
 
-    def _in_box(self, face: int, curves: list[int], arcs: list[Arc]) -> list[bool]:
-        middles = np.array([self._places(curves, arc, np.array([(arc.first + arc.last) / 2]))[0] for arc in arcs])
-        heights = self.faces.heights(np.array([face]), middles[np.newaxis, :, 0], middles[np.newaxis, :, 1])[0]
-        for index, arc in enumerate(arcs):
-            if arc.curve >= 0:
-                heights[index, self.sections.plane[curves[arc.curve]]] = np.inf
-        return [bool(keep) for keep in np.all(heights > 0, axis=1)]
+    def _in_box(self, arcs: list[list[Arc]]) -> list[list[Arc]]:
+        """Those of each face's arcs whose middle lies in the box, all in one look."""
+        flat = [arc for some in arcs for arc in some]
+        face = np.repeat(np.arange(len(arcs)), [len(some) for some in arcs])
+        middle = np.array([(arc.first + arc.last) / 2 for arc in flat])
+        place = np.stack(square_points(np.maximum([arc.side for arc in flat], 0), middle), axis=-1)
+        plane = np.full(len(flat), -1)
+        for index in [k for k, arc in enumerate(flat) if arc.curve >= 0]:
+            curve = self.curves[face[index]][flat[index].curve]
+            place[index] = self.sections.in_square(curve, middle[[index]])[0]
+            plane[index] = self.sections.plane[curve]
+        heights = self.faces.heights(face, *place.T[..., np.newaxis])[:, 0]
+        on_plane = np.flatnonzero(plane >= 0)
+        heights[on_plane, plane[on_plane]] = np.inf
+        keep = iter(np.all(heights > 0, axis=1).tolist())
+        return [[arc for arc in some if next(keep)] for some in arcs]
 
     def _places(self, curves: list[int], arc: Arc, t: Floats) -> Floats:
         if arc.curve >= 0:

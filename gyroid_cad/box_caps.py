@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.loops import linked, nested, signed_area
-from gyroid_cad.sections import PLANES
+from gyroid_cad.rims import PLANES
 from gyroid_cad.trimming import Arc, CutFace
 
 __all__ = ["Cap", "CapArc", "caps_of", "plane_axes"]
@@ -75,7 +75,7 @@ class Cap:
     Attributes
     ----------
     plane : int
-        Of :data:`~gyroid_cad.sections.PLANES`.
+        Of :data:`~gyroid_cad.rims.PLANES`.
     loops : list of list of (int, bool)
         Edges, and whether they are used the way they run; the outer loop first, the cap on the left seen from outside.
     area : float

@@ -15,7 +15,8 @@ from gyroid_cad.box_caps import Cap, CapArc, caps_of
 from gyroid_cad.complex import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.quadrature import SquareQuadrature
-from gyroid_cad.sections import PLANES, Faces, Sections
+from gyroid_cad.rims import PLANES, Faces
+from gyroid_cad.sections import Sections
 from gyroid_cad.trimming import CORNER, RIM, Arc, CutFace, Node, cut_faces
 from gyroid_cad.wall import Wall
 
@@ -53,7 +54,7 @@ class Box:
 
     @property
     def levels(self) -> Floats:
-        """Of each of :data:`~gyroid_cad.sections.PLANES`, along its axis; shape (6,)."""
+        """Of each of :data:`~gyroid_cad.rims.PLANES`, along its axis; shape (6,)."""
         return np.array([(self.low if sign > 0 else self.high)[axis] for axis, sign in PLANES])
 
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from gyroid_cad.loops import linked, nested
 from gyroid_cad.nurbs import gauss_points
 from gyroid_cad.quadrature import SquareQuadrature
-from gyroid_cad.sections import PLANES, Faces, Rims, Sections, plane_sections, rim_crossings, square_points
+from gyroid_cad.rims import PLANES, Faces, Rims, rim_crossings, square_points
+from gyroid_cad.sections import Sections, plane_sections
 
 __all__ = ["Arc", "CutFace", "Node", "Piece", "cut_faces"]
 

@@ -18,7 +18,8 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry
 from gyroid_cad.kernel.surfaces import kernel_curve, kernel_knots
 from gyroid_cad.nurbs import NurbsCurve
-from gyroid_cad.sections import PLANES, Sections, section_knots
+from gyroid_cad.rims import PLANES
+from gyroid_cad.sections import Sections, section_knots
 
 __all__ = ["realise_boxed"]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs import basis
+from gyroid_cad.roots import roots
 
 __all__ = ["AXES", "PLANES", "Faces", "Rims", "plane_heights", "rim_crossings", "square_points"]
 
@@ -24,9 +25,8 @@ PLANES = tuple((axis, sign) for axis in range(3) for sign in (1, -1))
 AXES = np.array([axis for axis, _ in PLANES])
 _SIGNS = np.array([sign for _, sign in PLANES], dtype=float)
 _INWARDS = np.array([[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]])
-# Along each side of the square: so close that a side crosses no plane twice between two of them, unless it touches it.
+# Along each side of the square: so close that between two of them a height is all but a parabola.
 _RIM_SAMPLES = 65
-_NEWTON_STEPS = 8
 # A gradient across a side, or of the coordinate itself, that small means that face and plane touch.
 _TOUCHING = 1e-7
 
@@ -91,7 +91,7 @@ class Faces:
         return np.concatenate([nets * weights, np.broadcast_to(weights, (*nets.shape[:3], 1))], axis=-1)
 
     def _functions(self, x: Floats, derivative: int) -> Floats:
-        return basis(self.knots, 3, x.ravel(), derivative).reshape(*x.shape, -1)
+        return basis(self.knots, 3, x.ravel(), derivative).reshape(*x.shape, len(self.weights))
 
     def heights(self, which: Integers, u: Floats, v: Floats) -> Floats:
         """How far points lie on the kept side of every plane, in mm; shape (m, q, 6), infinite for planes not near."""
@@ -127,7 +127,8 @@ class Rims:
 
 def _products(nets: Floats, along_u: Floats, along_v: Floats) -> Floats:
     """Sums over nets (m, n, n, 4) of functions (m, q, n) along u and v; shape (m, q, 4)."""
-    rows = (along_u @ nets.reshape(*nets.shape[:2], -1)).reshape(*along_u.shape[:2], *nets.shape[2:])
+    count, n = nets.shape[:2]
+    rows = (along_u @ nets.reshape(count, n, n * 4)).reshape(*along_u.shape[:2], n, 4)
     return np.asarray(np.einsum("mqjc,mqj->mqc", rows, along_v))
 
 
@@ -148,22 +149,20 @@ def rim_crossings(faces: Faces) -> Rims:
     KernelError
         If a side only touches a plane, or a corner lies in one.
     """
-    samples = np.linspace(-1, 1, _RIM_SAMPLES)
+    step = 2 / (_RIM_SAMPLES - 1)
+    samples = np.linspace(-1 - step, 1 + step, _RIM_SAMPLES + 2)
     every = np.arange(len(faces))
     uv = [square_points(side, samples) for side in range(4)]
     u, v = (np.tile(np.concatenate([pair[k] for pair in uv]), (len(faces), 1)) for k in (0, 1))
-    heights = faces.heights(every, u, v).reshape(len(faces), 4, _RIM_SAMPLES, 6)
-    above = heights > 0
-    face, side, before, plane = np.nonzero(above[:, :, 1:] != above[:, :, :-1])
-    here, there = heights[face, side, before, plane], heights[face, side, before + 1, plane]
-    step = samples[1] - samples[0]
-    lowest = samples[before]
-    along = lowest + step * here / (here - there)
-    for _ in range(_NEWTON_STEPS):
-        height, slopes = plane_heights(faces, face, plane, *square_points(side, along))
-        rate = _rate_along(side, slopes)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            along = np.clip(np.nan_to_num(along - height / rate), lowest, lowest + step)
+    heights = faces.heights(every, u, v).reshape(len(faces), 4, len(samples), len(PLANES))
+    face, side, plane = np.nonzero(np.isfinite(heights[:, :, 0]))
+
+    def along_side(which: Integers, along: Floats) -> tuple[Floats, Floats]:
+        height, slopes = plane_heights(faces, face[which], plane[which], *square_points(side[which], along))
+        return height, _rate_along(side[which], slopes)
+
+    which, along = roots(samples, heights[face, side, :, plane], along_side)
+    face, side, plane = face[which], side[which], plane[which]
     height, slopes = plane_heights(faces, face, plane, *square_points(side, along))
     steepness = np.linalg.norm(slopes, axis=-1)
     across = slopes[:, 1] * _INWARDS[side, 0] - slopes[:, 0] * _INWARDS[side, 1]

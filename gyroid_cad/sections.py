@@ -26,11 +26,14 @@ Integers = NDArray[np.int64]
 # In the square, whose sides are 2 long; finer where a curve is not followed to an exit.
 _STEPS = (0.1, 0.025, 0.006)
 _LONGEST = 24.0
+# Samples along each side, to see that no curve closes within the square.
+_GRID = 33
 # Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
 _STATIONS = (16, 32, 64, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
 _NEWTON_STEPS = 8
-_LEAST_OWN = 1e-3
+# Of what is solved for a spline; stations evenly spread give 4.
+_WORST_CONDITION = 1e3
 # A curve in the square that swings out so far is no fit.
 _WIDEST = 1.1
 # Of Newton's method in the square: near a saddle it would leap out of where the face is defined.
@@ -104,8 +107,10 @@ def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
     Raises
     ------
     KernelError
-        If a curve cannot be followed from one side to another: then the face touches the plane.
+        If a curve cannot be followed from one side to another: then the face touches the plane. Or if one closes
+        within the square, as only a wall that varies wildly has them.
     """
+    _require_open_curves(faces)
     starts = np.flatnonzero(rims.entering)
     for step in _STEPS:
         paths = _followed(faces, rims, starts, step)
@@ -116,6 +121,25 @@ def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
         raise KernelError("a face of the lattice touches the box: where they cross cannot be followed")
     ways = [np.vstack([path[:-1], rims.places[end]]) for path, end in zip(paths, ends.tolist(), strict=True)]
     return _fitted_closely(faces, rims, starts, ends, ways, size)
+
+
+def _require_open_curves(faces: Faces) -> None:
+    """Wherever a face lies above a plane, or below, one can go on doing so to a side of the square."""
+    face, plane = np.nonzero(~np.isnan(faces.levels))
+    through = basis(faces.knots, 3, np.linspace(-1, 1, _GRID))
+    heights = faces.nets[face, ..., AXES[plane]] - faces.levels[face, plane][:, np.newaxis, np.newaxis]
+    above = through @ (faces.weights * heights) @ through.T > 0
+    reached = np.ones_like(above)
+    reached[:, 1:-1, 1:-1] = False
+    along_u, along_v = above[:, 1:] == above[:, :-1], above[:, :, 1:] == above[:, :, :-1]
+    count = 0
+    while count < (count := int(np.count_nonzero(reached))):
+        reached[:, 1:] |= reached[:, :-1] & along_u
+        reached[:, :-1] |= reached[:, 1:] & along_u
+        reached[:, :, 1:] |= reached[:, :, :-1] & along_v
+        reached[:, :, :-1] |= reached[:, :, 1:] & along_v
+    if count < above.size:
+        raise KernelError("a face of the lattice bulges through a side of the box")
 
 
 def _followed(faces: Faces, rims: Rims, starts: Integers, step: float) -> list[Floats]:
@@ -212,7 +236,9 @@ def _fitted(
     t = np.array([_run(some) for some in points])
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
     # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
-    crowded = np.diagonal(through, axis1=1, axis2=2).min(axis=1) < _LEAST_OWN
+    crowded = ~np.all(np.isfinite(t), axis=1)
+    through[crowded] = np.eye(count + 1)
+    crowded |= np.linalg.cond(through) > _WORST_CONDITION
     through[crowded] = np.eye(count + 1)
     control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
     between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control

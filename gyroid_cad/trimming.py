@@ -16,6 +16,7 @@ from gyroid_cad.loops import linked, nested
 from gyroid_cad.nurbs import gauss_points
 from gyroid_cad.quadrature import SquareQuadrature
 from gyroid_cad.rims import PLANES, Faces, Rims, rim_crossings, square_points
+from gyroid_cad.roots import roots
 from gyroid_cad.sections import Sections, plane_sections
 
 __all__ = ["Arc", "CutFace", "Node", "Piece", "cut_faces"]
@@ -28,7 +29,6 @@ CORNER, RIM, BOX = "corner", "rim", "box"
 Node = tuple[str, int, int]
 
 _CHUNK = 64
-_NEWTON_STEPS = 6
 # Quadrature points a stretch between two stations of a section curve.
 _PER_STRETCH = 3
 _RIM_PIECES = 8
@@ -235,21 +235,18 @@ class _Cutting:
         levels = self.faces.levels[self.sections.face[curve]]
         own = PLANES[self.sections.plane[curve]][0]
         others = [k for k, (axis, _) in enumerate(PLANES) if axis != own and not np.isnan(levels[k])]
-        t = np.linspace(0, 1, 4 * len(self.sections.points[curve]))
-        axes = [PLANES[k][0] for k in others]
-        height = self.sections.in_space(curve, t)[:, axes] - levels[others]
-        before, which = np.nonzero((height[1:] > 0) != (height[:-1] > 0))
-        if not len(before):
+        if not others:
             return []
-        axis, level = np.array(axes)[which], levels[others][which]
-        low, high = t[before], t[before + 1]
-        here, there = height[before, which], height[before + 1, which]
-        root = low + (high - low) * here / (here - there)
-        each = np.arange(len(root))
-        for _ in range(_NEWTON_STEPS):
-            miss = self.sections.in_space(curve, root)[each, axis] - level
-            root = np.clip(root - miss / self.sections.in_space(curve, root, 1)[each, axis], low, high)
-        return [(others[k], float(value)) for k, value in zip(which.tolist(), root, strict=True)]
+        axes, at_levels = [PLANES[k][0] for k in others], levels[others]
+        count = 4 * len(self.sections.points[curve])
+        t = np.linspace(-1 / count, 1 + 1 / count, count + 3)
+
+        def along_curve(which: Integers, t: Floats) -> tuple[Floats, Floats]:
+            rows = np.arange(len(t)), np.array(axes)[which]
+            return self.sections.in_space(curve, t)[rows] - at_levels[which], self.sections.in_space(curve, t, 1)[rows]
+
+        which, places = roots(t, (self.sections.in_space(curve, t)[:, axes] - at_levels).T, along_curve)
+        return [(others[k], place) for k, place in zip(which.tolist(), places.tolist(), strict=True)]
 
     def _arcs(self, face: int, on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
         """All stretches of the square's sides and of the section curves, between the places where they meet."""

@@ -18,7 +18,7 @@ FOLDER = Path(gyroid_cad.__file__).parent
 ROWS = [
     ["errors"],
     ["version"],
-    ["arrays"],
+    ["arrays", "roots"],
     ["checks", "stages"],
     ["expressions"],
     ["fields"],

@@ -12,7 +12,7 @@ __all__ = ["roots"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_NEWTON_STEPS = 40
+_NEWTON_STEPS, _TURNING_STEPS = 40, 3
 _CONVERGED = 1e-14
 # A parabola that turns back between samples comes at most an eighth of its second difference nearer zero than they do.
 _HIDDEN = 1 / 4
@@ -43,14 +43,16 @@ def roots(
     which, index = np.nonzero(above[:, 2:-1] != above[:, 1:-2])
     low, high = samples[index + 1], samples[index + 2]
     low_value, high_value = values[which, index + 1], values[which, index + 2]
-    turned, before, turn, after = _turns(samples, values)
+    turned, before, turn, bend = _turns(samples, values)
+    for _ in range(_TURNING_STEPS):
+        turn = np.clip(turn - at(turned, turn)[1] / bend, samples[before], samples[before + 1])
     turn_value = at(turned, turn)[0]
     crossed = (turn_value > 0) != above[turned, before]
-    turned, before, turn, after, turn_value = (some[crossed] for some in (turned, before, turn, after, turn_value))
+    turned, before, turn, turn_value = (some[crossed] for some in (turned, before, turn, turn_value))
     which = np.concatenate([which, turned, turned])
-    low, high = np.concatenate([low, samples[before], turn]), np.concatenate([high, turn, samples[after]])
+    low, high = np.concatenate([low, samples[before], turn]), np.concatenate([high, turn, samples[before + 1]])
     low_value = np.concatenate([low_value, values[turned, before], turn_value])
-    high_value = np.concatenate([high_value, turn_value, values[turned, after]])
+    high_value = np.concatenate([high_value, turn_value, values[turned, before + 1]])
     place = low + (high - low) * low_value / (low_value - high_value)
     for _ in range(_NEWTON_STEPS):
         value, rate = at(which, place)
@@ -67,8 +69,12 @@ def roots(
     return which[order], place[order]
 
 
-def _turns(samples: Floats, values: Floats) -> tuple[Integers, Integers, Floats, Integers]:
-    """Which functions turn back, between which two samples and about where, too near zero to be sure of their sign."""
+def _turns(samples: Floats, values: Floats) -> tuple[Integers, Integers, Floats, Floats]:
+    """Which functions turn back too near zero to be sure of their sign.
+
+    Also the sample before that, about where it is, and the second derivative.
+    """
+    step = samples[1] - samples[0]
     here = values[:, 1:-1]
     with np.errstate(invalid="ignore"):
         bend = values[:, :-2] - 2 * here + values[:, 2:]
@@ -80,9 +86,8 @@ def _turns(samples: Floats, values: Floats) -> tuple[Integers, Integers, Floats,
     before = np.where(lean < 0, index - 1, index)
     inside = (np.abs(lean) <= 1) & (before >= 1) & (before < len(samples) - 2)
     same = (values[which, before] > 0) == (values[which, before + 1] > 0)
-    which, before, place = (
-        some[inside & same] for some in (which, before, samples[index] + lean * (samples[1] - samples[0]))
-    )
+    place, curvature = samples[index] + lean * step, bend[which, index - 1] / step**2
+    which, before, place, curvature = (some[inside & same] for some in (which, before, place, curvature))
     # Two neighbours that both see one turn agree well enough about it.
     _, first = np.unique(np.stack([which, before]), axis=1, return_index=True)
-    return which[first], before[first], place[first], before[first] + 1
+    return which[first], before[first], place[first], curvature[first]

@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # In the square, whose sides are 2 long; finer where a curve is not followed to an exit.
-_STEPS = (0.1, 0.025, 0.006)
-_LONGEST = 24.0
+_STEPS = (0.1, 0.025)
+_LONGEST = 8.0
 # Samples along each side, to see that no curve closes within the square.
 _GRID = 33
 # Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.

@@ -27,7 +27,8 @@ _SIGNS = np.array([sign for _, sign in PLANES], dtype=float)
 _INWARDS = np.array([[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]])
 # Along each side of the square: so close that between two of them a height is all but a parabola.
 _RIM_SAMPLES = 65
-# A gradient across a side, or of the coordinate itself, that small means that face and plane touch.
+# A gradient across a side, or of the coordinate itself, that small means that face and plane touch; nearer a corner, an
+# edge would be too short for the kernel.
 _TOUCHING = 1e-7
 
 
@@ -167,8 +168,8 @@ def rim_crossings(faces: Faces) -> Rims:
     steepness = np.linalg.norm(slopes, axis=-1)
     across = slopes[:, 1] * _INWARDS[side, 0] - slopes[:, 0] * _INWARDS[side, 1]
     size = np.ptp(faces.nets) if len(faces) else 1.0
-    touching = (np.abs(across) <= _TOUCHING * steepness) | (np.abs(height) > 1e-10 * size) | (np.abs(along) >= 1)
-    if np.any(touching):
+    touching = (np.abs(across) <= _TOUCHING * steepness) | (np.abs(height) > 1e-10 * size)
+    if np.any(touching | (np.abs(along) > 1 - _TOUCHING)):
         raise KernelError("an edge of the lattice touches the box")
     order = np.lexsort((along, side, face))
     return Rims(face[order], side[order], plane[order], along[order], (across > 0)[order])

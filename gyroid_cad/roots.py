@@ -14,6 +14,7 @@ Integers = NDArray[np.int64]
 
 _NEWTON_STEPS, _TURNING_STEPS = 40, 3
 _CONVERGED = 1e-14
+_ROUNDING = 1e-13
 # A parabola that turns back between samples comes at most an eighth of its second difference nearer zero than they do.
 _HIDDEN = 1 / 4
 
@@ -43,12 +44,7 @@ def roots(
     which, index = np.nonzero(above[:, 2:-1] != above[:, 1:-2])
     low, high = samples[index + 1], samples[index + 2]
     low_value, high_value = values[which, index + 1], values[which, index + 2]
-    turned, before, turn, bend = _turns(samples, values)
-    for _ in range(_TURNING_STEPS):
-        turn = np.clip(turn - at(turned, turn)[1] / bend, samples[before], samples[before + 1])
-    turn_value = at(turned, turn)[0]
-    crossed = (turn_value > 0) != above[turned, before]
-    turned, before, turn, turn_value = (some[crossed] for some in (turned, before, turn, turn_value))
+    turned, before, turn, turn_value = _turns(samples, values, at)
     which = np.concatenate([which, turned, turned])
     low, high = np.concatenate([low, samples[before], turn]), np.concatenate([high, turn, samples[before + 1]])
     low_value = np.concatenate([low_value, values[turned, before], turn_value])
@@ -69,25 +65,28 @@ def roots(
     return which[order], place[order]
 
 
-def _turns(samples: Floats, values: Floats) -> tuple[Integers, Integers, Floats, Floats]:
-    """Which functions turn back too near zero to be sure of their sign.
-
-    Also the sample before that, about where it is, and the second derivative.
-    """
-    step = samples[1] - samples[0]
+def _turns(
+    samples: Floats, values: Floats, at: Callable[[Integers, Floats], tuple[Floats, Floats]]
+) -> tuple[Integers, Integers, Floats, Floats]:
+    """Which functions turn back beyond zero between two samples, the one before, where that is, and the value there."""
     here = values[:, 1:-1]
     with np.errstate(invalid="ignore"):
         bend = values[:, :-2] - 2 * here + values[:, 2:]
         near = (np.sign(here) * bend > 0) & (np.abs(here) < _HIDDEN * np.abs(bend))
-    # Of parabolas through three samples: their vertices lie next to the middle ones.
     which, index = np.nonzero(near)
-    index = index + 1
-    lean = (values[which, index - 1] - values[which, index + 1]) / (2 * bend[which, index - 1])
-    before = np.where(lean < 0, index - 1, index)
-    inside = (np.abs(lean) <= 1) & (before >= 1) & (before < len(samples) - 2)
-    same = (values[which, before] > 0) == (values[which, before + 1] > 0)
-    place, curvature = samples[index] + lean * step, bend[which, index - 1] / step**2
-    which, before, place, curvature = (some[inside & same] for some in (which, before, place, curvature))
-    # Two neighbours that both see one turn agree well enough about it.
-    _, first = np.unique(np.stack([which, before]), axis=1, return_index=True)
-    return which[first], before[first], place[first], curvature[first]
+    # Of parabolas through three samples: their vertices lie next to the middle ones.
+    step, index, bend = samples[1] - samples[0], index + 1, bend[which, index]
+    turn = samples[index] + step * (values[which, index - 1] - values[which, index + 1]) / (2 * bend)
+    for _ in range(_TURNING_STEPS):
+        turn = np.clip(turn - step**2 * at(which, turn)[1] / bend, samples[index - 1], samples[index + 1])
+    before = np.where(turn < samples[index], index - 1, index)
+    value = at(which, turn)[0]
+    above = values[which, before] > 0
+    # What reaches zero by no more than rounding touches it.
+    beyond = ((value > 0) != above) & (np.abs(value) > _ROUNDING * np.abs(values[which]).max(axis=1, initial=0.0))
+    same = (values[which, before + 1] > 0) == above
+    wanted = np.flatnonzero(beyond & same & (before >= 1) & (before < len(samples) - 2))
+    # Two neighbours may both see one turn.
+    _, first = np.unique(np.stack([which, before])[:, wanted], axis=1, return_index=True)
+    wanted = wanted[first]
+    return which[wanted], before[wanted], turn[wanted], value[wanted]

@@ -63,7 +63,7 @@ def uses_of(made: BoxedWall) -> Counter[tuple[int, bool]]:
     return Counter((edge, forward != backwards) for loop, backwards in loops for edge, forward in loop)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(places, extents, walls, turns)
 def test_the_wall_and_the_labyrinths_beside_it_are_the_whole_box(
     low: Floats, extent: Floats, thickness: float, turn: tuple[float, float, float]
@@ -74,7 +74,7 @@ def test_the_wall_and_the_labyrinths_beside_it_are_the_whole_box(
     assert min(parts) >= 0
 
 
-@settings(max_examples=4)
+@settings(max_examples=3)
 @given(places, extents, walls, st.integers(0, 2), st.floats(0.2, 0.8))
 def test_a_box_cut_in_two_holds_what_both_halves_hold(
     low: Floats, extent: Floats, thickness: float, axis: int, part: float
@@ -95,7 +95,7 @@ def test_a_period_further_on_all_is_the_same(
     assert there == pytest.approx(here, rel=1e-9)
 
 
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(places, extents, walls)
 def test_every_edge_is_used_once_each_way_and_ends_where_its_neighbours_begin(
     low: Floats, extent: Floats, thickness: float
@@ -154,7 +154,7 @@ def test_a_box_of_whole_cells_is_as_dense_as_the_tube_formula_says_wherever_it_b
     )
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(
     st.tuples(*3 * [st.integers(-8, 8)]),
     st.tuples(*3 * [st.integers(1, 4)]),

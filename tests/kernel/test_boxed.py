@@ -18,7 +18,7 @@ from gyroid_cad.box_cut import Box, BoxedWall, cut_to_box
 from gyroid_cad.covering import AT_HOME, covering_complex, periodic_offsets
 from gyroid_cad.errors import KernelError
 from gyroid_cad.fit import FitSettings, FittedPatch, fit_patch
-from gyroid_cad.kernel.boxed import realise_boxed
+from gyroid_cad.kernel.boxed import hollowed_by, realise_boxed
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.split import compound_of
@@ -53,7 +53,7 @@ def boxed(
     return cut_to_box(build_wall(complex, patch(), L, thickness), box, sides, L, filled and capped, capped)
 
 
-@settings(max_examples=8)
+@settings(max_examples=5)
 @given(
     st.tuples(*3 * [st.floats(-L, L)]).map(np.array),
     st.tuples(*3 * [st.floats(0.1 * L, 0.6 * L)]).map(np.array),
@@ -112,3 +112,16 @@ def test_a_void_with_nothing_round_it_is_an_error() -> None:
     cut = boxed(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 3.0]), 0.9)
     with pytest.raises(KernelError, match="void"):
         realise_boxed(replace(cut, volumes=-cut.volumes))
+
+
+def test_a_solid_less_solids_within_it_is_one_valid_solid() -> None:
+    spots = np.random.default_rng(0).uniform(0, L, (2000, 3))
+    deepest = spots[np.argmin(np.abs(periodic_offsets(AT_HOME, L, spots)))]
+    outer, first, second = (
+        realise_boxed(boxed(deepest + shift, np.full(3, side), 0.3 * L))[0]
+        for shift, side in ((0.0, 0.5), (0.05, 0.1), (0.3, 0.1))
+    )
+    made = hollowed_by(outer, [first, second])
+    assert is_valid(made)
+    assert (topology(made).solids, topology(made).faces, topology(made).closed) == (1, 18, True)
+    assert measure(made) == pytest.approx((0.5**3 - 2 * 0.1**3, 6 * (0.5**2 + 2 * 0.1**2)))

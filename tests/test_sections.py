@@ -81,7 +81,7 @@ def test_the_same_place_has_the_same_curve_however_many_faces_are_cut_with_it(gr
         np.testing.assert_allclose(together.points[curve], alone.points[curve % len(alone)], atol=1e-12)
 
 
-@pytest.mark.parametrize("off", [0.0, *(sign * 10.0**-k for k in range(2, 15) for sign in (1, -1))])
+@pytest.mark.parametrize("off", [0.0, *(sign * 10.0**-k for k in (2, 3, 4, 6, 9, 14) for sign in (1, -1))])
 @pytest.mark.parametrize("height", [saddle, lambda x, y: 0.5 * x * y], ids=["lopsided", "even"])
 def test_next_to_a_saddle_curves_are_right_or_refused(graph: Graph, off: float, height: Height) -> None:
     faces = graph(height, {4: off})

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.sections import PLANES
-from gyroid_cad.trimming import Arc, CutFace, nested, signed_area
+from gyroid_cad.loops import linked, nested, signed_area
+from gyroid_cad.rims import PLANES
+from gyroid_cad.trimming import Arc, CutFace
 
 __all__ = ["Cap", "CapArc", "caps_of", "plane_axes"]
 
@@ -74,7 +75,7 @@ class Cap:
     Attributes
     ----------
     plane : int
-        Of :data:`~gyroid_cad.sections.PLANES`.
+        Of :data:`~gyroid_cad.rims.PLANES`.
     loops : list of list of (int, bool)
         Edges, and whether they are used the way they run; the outer loop first, the cap on the left seen from outside.
     area : float
@@ -212,15 +213,7 @@ def _upwards(plane: int, other: int) -> bool:
 
 
 def _linked_caps(plane: int, links: list[_Link]) -> list[Cap]:
-    onward = {link.start: link for link in links}
-    if len(onward) < len(links) or onward.keys() != {link.end for link in links}:
-        raise KernelError("curves where the lattice crosses a side of the box do not close")
-    loops: list[list[_Link]] = []
-    while onward:
-        loop = [onward.pop(next(iter(onward)))]
-        while loop[-1].end != loop[0].start:
-            loop.append(onward.pop(loop[-1].end))
-        loops.append(loop)
+    loops = linked(links, "the lattice on one of its sides")
     x, y = plane_axes(plane)
     outlines = [np.concatenate([link.outline[:-1] for link in loop])[:, [x, y]] for loop in loops]
     corners = [np.array([link.outline[0] for link in loop])[:, [x, y]] for loop in loops]

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from gyroid_cad.box_caps import Cap, CapArc, caps_of
 from gyroid_cad.complex import connected
 from gyroid_cad.errors import KernelError
-from gyroid_cad.sections import PLANES, Faces, Sections
-from gyroid_cad.trimming import CORNER, RIM, Arc, CutFace, Node, SquareQuadrature, cut_faces
+from gyroid_cad.quadrature import SquareQuadrature
+from gyroid_cad.rims import PLANES, Faces
+from gyroid_cad.sections import Sections
+from gyroid_cad.trimming import CORNER, RIM, Arc, CutFace, Node, cut_faces
 from gyroid_cad.wall import Wall
 
 __all__ = ["Box", "BoxEdge", "BoxFace", "BoxedWall", "cut_to_box"]
@@ -52,7 +54,7 @@ class Box:
 
     @property
     def levels(self) -> Floats:
-        """Of each of :data:`~gyroid_cad.sections.PLANES`, along its axis; shape (6,)."""
+        """Of each of :data:`~gyroid_cad.rims.PLANES`, along its axis; shape (6,)."""
         return np.array([(self.low if sign > 0 else self.high)[axis] for axis, sign in PLANES])
 
 
@@ -196,6 +198,9 @@ class _Assembly:
         self.nets = self.wall.nets @ self.box.axes
         self.shifts = (self.wall.shifts @ self.box.axes)[self.wall.patch_shift]
         complex = self.wall.complex
+        # Fluxes are taken about it: what is missing where a curve is not quite the faces' own counts for little there,
+        # and no more far from the origin.
+        self.middle = (self.box.low + self.box.high) / 2
         self.patch_edges, self.patch_fans = complex.patch_edges.tolist(), complex.patch_fans.tolist()
         self.forward = complex.edge_forward.tolist()
 
@@ -217,7 +222,7 @@ class _Assembly:
         uses = [[edge for loop in face.loops for edge, _ in loop] for face in self.faces]
         uses += [[edge for loop in cap.loops for edge, _ in loop] for cap in caps]
         component = _components(uses, len(self.edges), capped)
-        levels = self.box.levels
+        levels = self.box.levels - self.middle[[axis for axis, _ in PLANES]]
         fluxes = self.fluxes + [-PLANES[cap.plane][1] * levels[cap.plane] * cap.area / 3 for cap in caps]
         areas = self.areas + [cap.area for cap in caps]
         if capped:
@@ -266,7 +271,8 @@ class _Assembly:
         used, which = np.unique(self.wall.patch_net[patches], return_inverse=True)
         sums = quadrature.over_square(self.nets[used, side], self.wall.weights)[which]
         sign = -1.0 if backwards else 1.0
-        self.fluxes += (sign * (sums[:, 0] + np.sum(self.shifts[patches] * sums[:, 1:4], axis=1) / 3)).tolist()
+        offsets = self.shifts[patches] - self.middle
+        self.fluxes += (sign * (sums[:, 0] + np.sum(offsets * sums[:, 1:4], axis=1) / 3)).tolist()
         self.areas += sums[:, 4].tolist()
         self.vectors += list(sign * sums[:, 1:4])
         rims = [list(range(4))]
@@ -275,13 +281,13 @@ class _Assembly:
             self.faces.append(BoxFace(patch, side, [loop], rims, backwards))
 
     def _add_cut(self, patch: int, side: int, cut: CutFace, backwards: bool) -> None:
-        shift = self.shifts[patch]
+        offset = self.shifts[patch] - self.middle
         sign = -1.0 if backwards else 1.0
         for piece in cut.pieces:
             loops = [[self._edge(patch, side, cut, arc, backwards) for arc in loop] for loop in piece.loops]
             rims = [[arc.side for arc in loop] for loop in piece.loops]
             self.faces.append(BoxFace(patch, side, loops, rims, backwards))
-            self.fluxes.append(sign * (piece.flux + float(shift @ piece.area_vector) / 3))
+            self.fluxes.append(sign * (piece.flux + float(offset @ piece.area_vector) / 3))
             self.areas.append(piece.area)
             self.vectors.append(sign * piece.area_vector)
 

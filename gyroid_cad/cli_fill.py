@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from gyroid_cad.cli_lattice import chosen_surface, surface_option
 from gyroid_cad.tables import print_fill, shown_progress
 
 __all__ = ["fill_command"]
@@ -25,13 +26,7 @@ __all__ = ["fill_command"]
     metavar="FILE",
     help=".step, .stp, .brep, .stl or .3mf; may be repeated.",
 )
-@click.option(
-    "--surface",
-    type=click.Choice(["gyroid", "diamond", "primitive"]),
-    default="gyroid",
-    show_default=True,
-    help="Of the lattice.",
-)
+@surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(
     "--thickness",
@@ -79,6 +74,7 @@ def fill_command(
     deviation: float | None,
     angle: float,
     openings: tuple[str, ...],
+    surface: str | None,
     as_json: bool,
     quiet: bool,
     **given: Any,
@@ -100,7 +96,8 @@ def fill_command(
     require_settings((1, 1, 1), schema, deviation, angle)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         faces = [_face(opening) for opening in openings]
-        filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
+        settings = {**given, **chosen_surface(surface)}
+        filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **settings)
         filled.write(*output, schema=schema, deviation=deviation, angle=angle)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}

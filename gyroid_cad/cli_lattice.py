@@ -12,7 +12,7 @@ from gyroid_cad.errors import ParameterError
 if TYPE_CHECKING:
     from gyroid_cad.lattice import Lattice
 
-__all__ = ["lattice_of", "lattice_options", "option_name", "printed_options"]
+__all__ = ["chosen_surface", "lattice_of", "lattice_options", "option_name", "printed_options", "surface_option"]
 
 _CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
@@ -42,6 +42,8 @@ def printed_options() -> str:
     return printed_config({name: context.params[name] for name in keys if name not in _NO_KEYS})
 
 
+# Which surfaces there are is for the table of families to say; it is not read for --help alone.
+surface_option = click.option("--surface", metavar="NAME", help="gyroid, diamond or primitive; gyroid if left out.")
 _OPTIONS = (
     click.argument(
         "config",
@@ -50,13 +52,7 @@ _OPTIONS = (
         is_eager=True,
         callback=_defaults_from_file,
     ),
-    click.option(
-        "--surface",
-        type=click.Choice(["gyroid", "diamond", "primitive"]),
-        default="gyroid",
-        show_default=True,
-        help="Of the lattice.",
-    ),
+    surface_option,
     click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z."),
     click.option(
         "--cell-size", type=float, metavar="MM", help="Period of the cubic cell, before it is scaled or mapped."
@@ -121,6 +117,11 @@ def lattice_options(function: Callable[..., None]) -> Callable[..., None]:
     return function
 
 
+def chosen_surface(name: str | None) -> dict[str, Any]:
+    """The keyword for a surface, or none where none was asked for."""
+    return {} if name is None else {"surface": name}
+
+
 def lattice_of(given: dict[str, Any]) -> Lattice:
     """The lattice that the options describe, in millimetres or in the paper's units.
 
@@ -137,6 +138,7 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     if given["cells"] is None:
         raise click.UsageError("Missing option '--cells'.")
     fit = _fit_settings(given["fit"], given["control_points"])
+    surface = chosen_surface(given["surface"])
     if any(given[name] is not None for name in _PAPER_OPTIONS):
         mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map", "trim") if given[name] is not None]
         if mixed or given["thickness_factor"] is None:
@@ -146,13 +148,13 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
                 + ", ".join(map(option_name, mixed or (*_OWN_OPTIONS, "cell_size", "map", "trim")))
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
-        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
+        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], **surface)
     if given["cell_size"] is None:
         raise click.UsageError("Missing option '--cell-size'.")
     if (given["thickness"] is None) == (given["density"] is None):
         raise click.UsageError("give exactly one of --thickness and --density")
-    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim", "surface")}
-    return Lattice(given["cells"], given["cell_size"], **own, fit=fit)
+    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
+    return Lattice(given["cells"], given["cell_size"], **own, **surface, fit=fit)
 
 
 def _fit_settings(fit: str, control_points: int) -> Any:

@@ -116,7 +116,7 @@ class Filling:
         attempts: list[tuple[Point, bool, int | None]] = [
             (phase, False, processes) for phase, processes in zip(PHASES, (None, None, 1), strict=True)
         ]
-        if self.core.box is not None and self.hollow is None:
+        if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
             # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
             attempts = [(phase, True, None) for phase in PHASES] + attempts
         for phase, by_sections, processes in attempts:
@@ -153,18 +153,31 @@ class Filling:
         corner = (box.axes @ box.low)[np.newaxis]
         made, cut, whole = {}, 0, 0
         for region in self.regions:
+            # A skin and what is joined to it are the part less the voids that the lattice leaves in the core.
+            skinned = self.hollow is not None and not region.fluid
+            sides = [(side, backwards != skinned) for side, backwards in region.sides]
             with self.timed("cut"):
-                filled = not region.surface and bool(infill.holds(region, corner)[0])
-                left = cut_to_box(infill.wall, box, region.sides, self.cell_size, filled, capped=not region.surface)
+                filled = not region.surface and bool(infill.holds(region, corner)[0]) != skinned
+                left = cut_to_box(infill.wall, box, sides, self.cell_size, filled, capped=not region.surface)
             with self.timed("solid"):
                 shapes = realise_boxed(left)
-            made[region.name] = [
+            pieces = [
                 Made(shape, 0.0 if region.surface else float(volume), float(area))
                 for shape, volume, area in zip(shapes, left.volumes, left.areas, strict=True)
             ]
+            made[region.name] = [self._less(pieces)] if skinned else pieces
             counted = _patches_of(left)
             cut, whole = max(cut, counted[0]), max(whole, counted[1])
         return made, cut, whole
+
+    def _less(self, voids: list[Made]) -> Made:
+        """The part less voids within it."""
+        from gyroid_cad.kernel.boxed import hollowed_by
+        from gyroid_cad.kernel.part import measure
+
+        volume, area = measure(self.part.shape)
+        shape = hollowed_by(self.part.shape, (void.shape for void in voids))
+        return Made(shape, volume - sum(void.volume for void in voids), area + sum(void.area for void in voids))
 
     def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
         from gyroid_cad.kernel.part import measure

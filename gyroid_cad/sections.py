@@ -16,124 +16,28 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs import basis
+from gyroid_cad.rims import AXES, Faces, Rims, plane_heights
 
-__all__ = ["PLANES", "Faces", "Rims", "Sections", "plane_sections", "rim_crossings", "section_knots", "square_points"]
+__all__ = ["Sections", "plane_sections", "section_knots"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Booleans = NDArray[np.bool_]
 
-# Of a box: low and high along x, then y, then z. What is kept lies above the low ones, below the high ones.
-PLANES = tuple((axis, sign) for axis in range(3) for sign in (1, -1))
-_AXES = np.array([axis for axis, _ in PLANES])
-_SIGNS = np.array([sign for _, sign in PLANES], dtype=float)
-_INWARDS = np.array([[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]])
-# Along each side of the square: so close that a side crosses no plane twice between two of them, unless it touches it.
-_RIM_SAMPLES = 65
 # In the square, whose sides are 2 long; finer where a curve is not followed to an exit.
-_STEPS = (0.1, 0.025, 0.006)
-_LONGEST = 24.0
+_STEPS = (0.1, 0.025)
+_LONGEST = 8.0
+# Samples along each side, to see that no curve closes within the square.
+_GRID = 33
 # Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
 _STATIONS = (16, 32, 64, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
 _NEWTON_STEPS = 8
-_LEAST_OWN = 1e-3
+# Of what is solved for a spline; stations evenly spread give 4.
+_WORST_CONDITION = 1e3
 # A curve in the square that swings out so far is no fit.
 _WIDEST = 1.1
 # Of Newton's method in the square: near a saddle it would leap out of where the face is defined.
 _LONGEST_STEP = 0.1
-# A gradient across a side, or of the coordinate itself, that small means that face and plane touch.
-_TOUCHING = 1e-7
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Faces:
-    """Faces of the wall, in coordinates along a box's axes, and the planes that come near them.
-
-    Attributes
-    ----------
-    nets : ndarray, shape (faces, n, n, 3)
-        In mm.
-    weights : ndarray, shape (n, n)
-    knots : ndarray, shape (n + 4,)
-    levels : ndarray, shape (faces, 6)
-        Coordinate of each of :data:`PLANES`, in mm; not a number where a plane is not near.
-    """
-
-    nets: Floats
-    weights: Floats
-    knots: Floats
-    levels: Floats
-
-    def __len__(self) -> int:
-        return len(self.nets)
-
-    def chunk(self, first: int, count: int) -> Faces:
-        """Some of the faces."""
-        chosen = slice(first, first + count)
-        return Faces(self.nets[chosen], self.weights, self.knots, self.levels[chosen])
-
-    def derivatives(self, which: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points and first derivatives of chosen faces (A4.4), extended past the square's sides.
-
-        Parameters
-        ----------
-        which : ndarray of int, shape (m,)
-        u, v : ndarray, shape (m, q)
-
-        Returns
-        -------
-        points, du, dv : ndarray, shape (m, q, 3)
-        """
-        n = len(self.weights)
-        nets = self.nets[which]
-        homogeneous = np.concatenate(
-            [
-                nets * self.weights[..., np.newaxis],
-                np.broadcast_to(self.weights[..., np.newaxis], (*nets.shape[:3], 1)),
-            ],
-            axis=-1,
-        ).reshape(len(which), n, n * 4)
-        along = [[basis(self.knots, 3, x.ravel(), k).reshape(*x.shape, n) for k in (0, 1)] for x in (u, v)]
-        rows, rows_u = ((b @ homogeneous).reshape(*u.shape, n, 4) for b in along[0])
-        point, du, dv = (
-            np.einsum("mqjc,mqj->mqc", row, b)
-            for row, b in ((rows, along[1][0]), (rows_u, along[1][0]), (rows, along[1][1]))
-        )
-        weight = point[..., 3:]
-        place = point[..., :3] / weight
-        return place, (du[..., :3] - du[..., 3:] * place) / weight, (dv[..., :3] - dv[..., 3:] * place) / weight
-
-    def heights(self, which: Integers, u: Floats, v: Floats) -> Floats:
-        """How far points lie on the kept side of every plane, in mm; shape (m, q, 6), infinite for planes not near."""
-        points = self.derivatives(which, u, v)[0]
-        heights = _SIGNS * (points[..., _AXES] - self.levels[which][:, np.newaxis])
-        return np.where(np.isnan(heights), np.inf, heights)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rims:
-    """Where sides of the square cross planes, ordered by face, then side, then along the side.
-
-    Attributes
-    ----------
-    face, side, plane : ndarray of int, shape (crossings,)
-    along : ndarray, shape (crossings,)
-        In [-1, 1], as one runs round the square.
-    entering : ndarray of bool, shape (crossings,)
-        Whether the curve that keeps what is wanted on its left enters the square there.
-    """
-
-    face: Integers
-    side: Integers
-    plane: Integers
-    along: Floats
-    entering: Booleans
-
-    @property
-    def places(self) -> Floats:
-        """In the square; shape (crossings, 2)."""
-        return np.stack(square_points(self.side, self.along), axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,50 +94,6 @@ def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
     return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
 
 
-def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:
-    """Parameters (u, v) of places on the square's sides, run round it."""
-    along = np.asarray(along)
-    one = np.ones_like(along)
-    u = np.choose(side, [along, one, -along, -one])
-    v = np.choose(side, [-one, along, one, -along])
-    return u, v
-
-
-def rim_crossings(faces: Faces) -> Rims:
-    """Where the sides of faces cross the planes near them.
-
-    Raises
-    ------
-    KernelError
-        If a side only touches a plane, or a corner lies in one.
-    """
-    samples = np.linspace(-1, 1, _RIM_SAMPLES)
-    every = np.arange(len(faces))
-    uv = [square_points(side, samples) for side in range(4)]
-    u, v = (np.tile(np.concatenate([pair[k] for pair in uv]), (len(faces), 1)) for k in (0, 1))
-    heights = faces.heights(every, u, v).reshape(len(faces), 4, _RIM_SAMPLES, 6)
-    above = heights > 0
-    face, side, before, plane = np.nonzero(above[:, :, 1:] != above[:, :, :-1])
-    here, there = heights[face, side, before, plane], heights[face, side, before + 1, plane]
-    step = samples[1] - samples[0]
-    lowest = samples[before]
-    along = lowest + step * here / (here - there)
-    for _ in range(_NEWTON_STEPS):
-        height, slopes = _height(faces, face, plane, *square_points(side, along))
-        rate = _rate_along(side, slopes)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            along = np.clip(np.nan_to_num(along - height / rate), lowest, lowest + step)
-    height, slopes = _height(faces, face, plane, *square_points(side, along))
-    steepness = np.linalg.norm(slopes, axis=-1)
-    across = slopes[:, 1] * _INWARDS[side, 0] - slopes[:, 0] * _INWARDS[side, 1]
-    size = np.ptp(faces.nets) if len(faces) else 1.0
-    touching = (np.abs(across) <= _TOUCHING * steepness) | (np.abs(height) > 1e-10 * size) | (np.abs(along) >= 1)
-    if np.any(touching):
-        raise KernelError("an edge of the lattice touches the box")
-    order = np.lexsort((along, side, face))
-    return Rims(face[order], side[order], plane[order], along[order], (across > 0)[order])
-
-
 def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
     """The curves between the crossings of the sides.
 
@@ -247,8 +107,10 @@ def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
     Raises
     ------
     KernelError
-        If a curve cannot be followed from one side to another: then the face touches the plane.
+        If a curve cannot be followed from one side to another: then the face touches the plane. Or if one closes
+        within the square, as only a wall that varies wildly has them.
     """
+    _require_open_curves(faces)
     starts = np.flatnonzero(rims.entering)
     for step in _STEPS:
         paths = _followed(faces, rims, starts, step)
@@ -261,22 +123,23 @@ def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
     return _fitted_closely(faces, rims, starts, ends, ways, size)
 
 
-def _rate_along(side: Integers, slopes: Floats) -> Floats:
-    """Rate of change along the side, from the slopes along u and v."""
-    return np.choose(side, [slopes[:, 0], slopes[:, 1], -slopes[:, 0], -slopes[:, 1]])
-
-
-def _height(faces: Faces, face: Integers, plane: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Heights above one plane each, shape of u and v, (m,) or (m, q); and their slopes along u and v, (..., 2)."""
-    flat = u.ndim == 1
-    if flat:
-        u, v = u[:, np.newaxis], v[:, np.newaxis]
-    rows = np.arange(len(face))
-    values = [d[rows, :, _AXES[plane]] for d in faces.derivatives(face, u, v)]
-    sign = _SIGNS[plane][:, np.newaxis]
-    height = sign * (values[0] - faces.levels[face, plane][:, np.newaxis])
-    slopes = sign[..., np.newaxis] * np.stack(values[1:], axis=-1)
-    return (height[:, 0], slopes[:, 0]) if flat else (height, slopes)
+def _require_open_curves(faces: Faces) -> None:
+    """Wherever a face lies above a plane, or below, one can go on doing so to a side of the square."""
+    face, plane = np.nonzero(~np.isnan(faces.levels))
+    through = basis(faces.knots, 3, np.linspace(-1, 1, _GRID))
+    heights = faces.nets[face, ..., AXES[plane]] - faces.levels[face, plane][:, np.newaxis, np.newaxis]
+    above = through @ (faces.weights * heights) @ through.T > 0
+    reached = np.ones_like(above)
+    reached[:, 1:-1, 1:-1] = False
+    along_u, along_v = above[:, 1:] == above[:, :-1], above[:, :, 1:] == above[:, :, :-1]
+    count = 0
+    while count < (count := int(np.count_nonzero(reached))):
+        reached[:, 1:] |= reached[:, :-1] & along_u
+        reached[:, :-1] |= reached[:, 1:] & along_u
+        reached[:, :, 1:] |= reached[:, :, :-1] & along_v
+        reached[:, :, :-1] |= reached[:, :, 1:] & along_v
+    if count < above.size:
+        raise KernelError("a face of the lattice bulges through a side of the box")
 
 
 def _followed(faces: Faces, rims: Rims, starts: Integers, step: float) -> list[Floats]:
@@ -289,7 +152,7 @@ def _followed(faces: Faces, rims: Rims, starts: Integers, step: float) -> list[F
         onward = _along(faces, face, plane, place)
         place = place + step * _along(faces, face, plane, place + step / 2 * onward)
         for _ in range(2):
-            place = place + _towards(*_height(faces, face, plane, *place.T))
+            place = place + _towards(*plane_heights(faces, face, plane, *place.T))
         for curve, point in zip(live.tolist(), place, strict=True):
             paths[curve].append(point)
         inside = np.all(np.abs(place) < 1, axis=1)
@@ -301,7 +164,7 @@ def _followed(faces: Faces, rims: Rims, starts: Integers, step: float) -> list[F
 
 def _along(faces: Faces, face: Integers, plane: Integers, place: Floats) -> Floats:
     """The unit direction that keeps what is higher on its left."""
-    slopes = _height(faces, face, plane, *place.T)[1]
+    slopes = plane_heights(faces, face, plane, *place.T)[1]
     turned = np.stack([slopes[:, 1], -slopes[:, 0]], axis=-1)
     return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
@@ -373,12 +236,14 @@ def _fitted(
     t = np.array([_run(some) for some in points])
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
     # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
-    crowded = np.diagonal(through, axis1=1, axis2=2).min(axis=1) < _LEAST_OWN
+    crowded = ~np.all(np.isfinite(t), axis=1)
+    through[crowded] = np.eye(count + 1)
+    crowded |= np.linalg.cond(through) > _WORST_CONDITION
     through[crowded] = np.eye(count + 1)
     control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
     between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
     astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
-    exact = faces.derivatives(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))[0]
+    exact = faces.points(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))
     deviation = np.linalg.norm(exact - between[..., 2:], axis=-1).max(axis=1)
     return control[..., :2], control[..., 2:], np.where(crowded | astray, np.inf, deviation)
 
@@ -386,12 +251,12 @@ def _fitted(
 def _onto_level(faces: Faces, face: Integers, plane: Integers, stations: Floats) -> Floats:
     """Move stations between the ends onto the level curve, in place; their points in space."""
     for _ in range(_NEWTON_STEPS):
-        step = _towards(*_height(faces, face, plane, stations[..., 0], stations[..., 1]))
+        step = _towards(*plane_heights(faces, face, plane, stations[..., 0], stations[..., 1]))
         stations[:, 1:-1] += step[:, 1:-1]
         if np.max(np.abs(step[:, 1:-1])) < 1e-13:
             break
-    points = faces.derivatives(face, stations[..., 0], stations[..., 1])[0]
-    points[np.arange(len(face)), :, _AXES[plane]] = faces.levels[face, plane][:, np.newaxis]
+    points = faces.points(face, stations[..., 0], stations[..., 1])
+    points[np.arange(len(face)), :, AXES[plane]] = faces.levels[face, plane][:, np.newaxis]
     return points
 
 

@@ -8,16 +8,18 @@ link up to loops by themselves.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.errors import KernelError
-from gyroid_cad.nurbs import grid_derivatives
-from gyroid_cad.sections import PLANES, Faces, Rims, Sections, plane_sections, rim_crossings, square_points
+from gyroid_cad.loops import linked, nested
+from gyroid_cad.nurbs import gauss_points
+from gyroid_cad.quadrature import SquareQuadrature
+from gyroid_cad.rims import PLANES, Faces, Rims, rim_crossings, square_points
+from gyroid_cad.roots import roots
+from gyroid_cad.sections import Sections, plane_sections
 
-__all__ = ["Arc", "CutFace", "Node", "Piece", "SquareQuadrature", "cut_faces"]
+__all__ = ["Arc", "CutFace", "Node", "Piece", "cut_faces"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,7 +29,6 @@ CORNER, RIM, BOX = "corner", "rim", "box"
 Node = tuple[str, int, int]
 
 _CHUNK = 64
-_NEWTON_STEPS = 6
 # Quadrature points a stretch between two stations of a section curve.
 _PER_STRETCH = 3
 _RIM_PIECES = 8
@@ -125,7 +126,7 @@ class CutFace:
     def bulge(self, arc: Arc, x: int, y: int) -> float:
         """Area between an arc of a section curve and its chord, seen along two axes, in mm2; positive to its right."""
         curve = self.curves[arc.curve]
-        t, weights = _composite(arc.first, arc.last, len(self.sections.points[curve]))
+        t, weights = _on_pieces(arc, len(self.sections.points[curve]))
         place, rate = (self.sections.in_space(curve, t, k)[:, [x, y]] for k in (0, 1))
         ends = self.sections.in_space(curve, np.array([arc.first, arc.last]))[:, [x, y]]
         place = place - ends[0]
@@ -174,11 +175,11 @@ class _Cutting:
     def run(self) -> list[CutFace]:
         quadrature = SquareQuadrature(self.faces.knots)
         densities = quadrature.densities(self.faces.nets, self.faces.weights)
+        found = [self._edge_points(curves) for curves in self.curves]
+        arcs = [self._arcs(face, on_curves) for face, (_, _, on_curves) in enumerate(found)]
         cut = []
-        for face, curves in enumerate(self.curves):
-            points, edges, on_curves = self._edge_points(curves)
-            arcs = self._arcs(face, curves, on_curves)
-            kept = [arc for arc, keep in zip(arcs, self._in_box(face, curves, arcs), strict=True) if keep]
+        for face, (curves, kept) in enumerate(zip(self.curves, self._in_box(arcs), strict=True)):
+            points, edges, _ = found[face]
             pieces = [
                 self._measured(curves, loops, quadrature, densities[face]) for loops in self._pieces(curves, kept)
             ]
@@ -234,23 +235,20 @@ class _Cutting:
         levels = self.faces.levels[self.sections.face[curve]]
         own = PLANES[self.sections.plane[curve]][0]
         others = [k for k, (axis, _) in enumerate(PLANES) if axis != own and not np.isnan(levels[k])]
-        t = np.linspace(0, 1, 4 * len(self.sections.points[curve]))
-        axes = [PLANES[k][0] for k in others]
-        height = self.sections.in_space(curve, t)[:, axes] - levels[others]
-        before, which = np.nonzero((height[1:] > 0) != (height[:-1] > 0))
-        if not len(before):
+        if not others:
             return []
-        axis, level = np.array(axes)[which], levels[others][which]
-        low, high = t[before], t[before + 1]
-        here, there = height[before, which], height[before + 1, which]
-        root = low + (high - low) * here / (here - there)
-        each = np.arange(len(root))
-        for _ in range(_NEWTON_STEPS):
-            miss = self.sections.in_space(curve, root)[each, axis] - level
-            root = np.clip(root - miss / self.sections.in_space(curve, root, 1)[each, axis], low, high)
-        return [(others[k], float(value)) for k, value in zip(which.tolist(), root, strict=True)]
+        axes, at_levels = [PLANES[k][0] for k in others], levels[others]
+        count = 4 * len(self.sections.points[curve])
+        t = np.linspace(-1 / count, 1 + 1 / count, count + 3)
 
-    def _arcs(self, face: int, curves: list[int], on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
+        def along_curve(which: Integers, t: Floats) -> tuple[Floats, Floats]:
+            rows = np.arange(len(t)), np.array(axes)[which]
+            return self.sections.in_space(curve, t)[rows] - at_levels[which], self.sections.in_space(curve, t, 1)[rows]
+
+        which, places = roots(t, (self.sections.in_space(curve, t)[:, axes] - at_levels).T, along_curve)
+        return [(others[k], place) for k, place in zip(which.tolist(), places.tolist(), strict=True)]
+
+    def _arcs(self, face: int, on_curves: list[list[tuple[float, int]]]) -> list[Arc]:
         """All stretches of the square's sides and of the section curves, between the places where they meet."""
         arcs = []
         node_of: dict[int, Node] = {}
@@ -264,20 +262,29 @@ class _Cutting:
                 (CORNER, (side + 1) % 4, 0),
             ]
             arcs += _stretches(side, -1, stops, nodes)
-        for index, curve in enumerate(curves):
+        for index, curve in enumerate(self.curves[face]):
             stops = [0.0, *(t for t, _ in on_curves[index]), 1.0]
             ends = node_of[int(self.sections.start[curve])], node_of[int(self.sections.end[curve])]
             nodes = [ends[0], *((BOX, k, 0) for _, k in on_curves[index]), ends[1]]
             arcs += _stretches(-1, index, stops, nodes)
         return arcs
 
-    def _in_box(self, face: int, curves: list[int], arcs: list[Arc]) -> list[bool]:
-        middles = np.array([self._places(curves, arc, np.array([(arc.first + arc.last) / 2]))[0] for arc in arcs])
-        heights = self.faces.heights(np.array([face]), middles[np.newaxis, :, 0], middles[np.newaxis, :, 1])[0]
-        for index, arc in enumerate(arcs):
-            if arc.curve >= 0:
-                heights[index, self.sections.plane[curves[arc.curve]]] = np.inf
-        return [bool(keep) for keep in np.all(heights > 0, axis=1)]
+    def _in_box(self, arcs: list[list[Arc]]) -> list[list[Arc]]:
+        """Those of each face's arcs whose middle lies in the box, all in one look."""
+        flat = [arc for some in arcs for arc in some]
+        face = np.repeat(np.arange(len(arcs)), [len(some) for some in arcs])
+        middle = np.array([(arc.first + arc.last) / 2 for arc in flat])
+        place = np.stack(square_points(np.maximum([arc.side for arc in flat], 0), middle), axis=-1)
+        plane = np.full(len(flat), -1)
+        for index in [k for k, arc in enumerate(flat) if arc.curve >= 0]:
+            curve = self.curves[face[index]][flat[index].curve]
+            place[index] = self.sections.in_square(curve, middle[[index]])[0]
+            plane[index] = self.sections.plane[curve]
+        heights = self.faces.heights(face, *place.T[..., np.newaxis])[:, 0]
+        on_plane = np.flatnonzero(plane >= 0)
+        heights[on_plane, plane[on_plane]] = np.inf
+        keep = iter(np.all(heights > 0, axis=1).tolist())
+        return [[arc for arc in some if next(keep)] for some in arcs]
 
     def _places(self, curves: list[int], arc: Arc, t: Floats) -> Floats:
         if arc.curve >= 0:
@@ -289,7 +296,7 @@ class _Cutting:
 
     def _pieces(self, curves: list[int], kept: list[Arc]) -> list[list[list[Arc]]]:
         """Loops of arcs, holes with the loop round them."""
-        loops = linked(kept)
+        loops = linked(kept, "a face of the lattice")
         outlines = [self._outline(curves, loop) for loop in loops]
         return [[loops[index] for index in group] for group in nested(outlines)]
 
@@ -308,7 +315,7 @@ class _Cutting:
             if arc.side in (0, 2, 3):
                 continue
             count = _RIM_PIECES if arc.curve < 0 else len(self.sections.points[curves[arc.curve]])
-            t, weights = _composite(arc.first, arc.last, count)
+            t, weights = _on_pieces(arc, count)
             places.append(self._places(curves, arc, t))
             rate = 1.0 if arc.curve < 0 else self.sections.in_square(curves[arc.curve], t, 1)[:, 1]
             rates.append(weights * rate)
@@ -316,135 +323,11 @@ class _Cutting:
         return Piece(loops, float(total[0]), total[1:4], float(total[4]))
 
 
-class SquareQuadrature:
-    """Integrals over part of the parameter square, of functions sampled once on the whole of it.
-
-    Parameters
-    ----------
-    knots : ndarray
-        Between which the functions are smooth, along u and v.
-    """
-
-    _PER_SPAN = 9
-
-    def __init__(self, knots: Floats) -> None:
-        self.breaks = np.unique(knots)
-        self.nodes, self.weights = np.polynomial.legendre.leggauss(self._PER_SPAN)
-        half = np.diff(self.breaks)[:, np.newaxis] / 2
-        self.places = (self.breaks[:-1, np.newaxis] + half * (1 + self.nodes)).ravel()
-        self.knots = knots
-
-    def densities(self, nets: Floats, weights: Floats) -> Floats:
-        """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, nodes, nodes, 5)."""
-        points, du, dv = grid_derivatives(nets, weights, (self.knots, self.knots), self.places, self.places)
-        across = np.cross(du, dv)
-        flux = np.sum(points * across, axis=-1, keepdims=True) / 3
-        return np.concatenate([flux, across, np.linalg.norm(across, axis=-1, keepdims=True)], axis=-1)
-
-    def over_square(self, nets: Floats, weights: Floats) -> Floats:
-        """Integrals over whole faces; shape (faces, 5)."""
-        along = (np.diff(self.breaks)[:, np.newaxis] / 2 * self.weights).ravel()
-        chunks = [nets[first : first + _CHUNK] for first in range(0, len(nets), _CHUNK)]
-        sums = [
-            np.einsum("u,v,fuvk->fk", along, along, self.densities(chunk, weights), optimize=True) for chunk in chunks
-        ]
-        return np.concatenate(sums) if sums else np.zeros((0, 5))
-
-    def over(self, places: Floats, rates: Floats, density: Floats) -> Floats:
-        """Sum of rates times the integral of a density along u, from -1 to each place; shape (5,)."""
-        along_u, along_v = self._functions(places[:, 0])[1], self._functions(places[:, 1])[0]
-        return np.asarray(np.einsum("uv,uvk->k", along_u.T @ (along_v * rates[:, np.newaxis]), density))
-
-    def _functions(self, x: Floats) -> tuple[Floats, Floats]:
-        """Lagrange polynomials on the spans' Gauss points at x, and their integrals from -1 to x."""
-        spans, p = len(self.breaks) - 1, self._PER_SPAN
-        span = np.clip(np.searchsorted(self.breaks, x, side="right") - 1, 0, spans - 1)
-        half = np.diff(self.breaks) / 2
-        local = (x - self.breaks[span]) / half[span] - 1
-        legendre = np.polynomial.legendre.legvander(local, p)
-        order = np.arange(p)
-        at_nodes = (
-            np.polynomial.legendre.legvander(self.nodes, p - 1) * (2 * order + 1) / 2 * self.weights[:, np.newaxis]
-        )
-        integrals = np.empty_like(legendre[:, :p])
-        integrals[:, 0] = local + 1
-        integrals[:, 1:] = (legendre[:, 2:] - legendre[:, :-2]) / (2 * order[1:] + 1)
-        rows = np.arange(len(x))
-        values, sums = np.zeros((len(x), spans, p)), np.zeros((len(x), spans, p))
-        values[rows, span] = legendre[:, :p] @ at_nodes.T
-        sums[:] = np.where(np.arange(spans) < span[:, np.newaxis], half, 0.0)[..., np.newaxis] * self.weights
-        sums[rows, span] = (integrals @ at_nodes.T) * half[span, np.newaxis]
-        return values.reshape(len(x), -1), sums.reshape(len(x), -1)
-
-
-def linked(arcs: list[Arc]) -> list[list[Arc]]:
-    """Arcs as closed loops.
-
-    Raises
-    ------
-    KernelError
-        If arcs do not link up one for one.
-    """
-    onward = {arc.start: arc for arc in arcs}
-    if len(onward) < len(arcs) or onward.keys() != {arc.end for arc in arcs}:
-        raise KernelError("what the box leaves of a face of the lattice does not close")
-    loops = []
-    while onward:
-        loop = [onward.pop(next(iter(onward)))]
-        while loop[-1].end != loop[0].start:
-            loop.append(onward.pop(loop[-1].end))
-        loops.append(loop)
-    return loops
-
-
-def nested(outlines: list[Floats]) -> list[list[int]]:
-    """Outlines (k, 2) that run round what they bound, each with those of its holes.
-
-    Raises
-    ------
-    KernelError
-        If a hole lies in nothing.
-    """
-    areas = np.array([signed_area(outline) for outline in outlines])
-    groups = {index: [index] for index in np.flatnonzero(areas > 0).tolist()}
-    for hole in np.flatnonzero(areas <= 0).tolist():
-        around = [index for index in groups if holds(outlines[index], outlines[hole][0])]
-        if not around:
-            raise KernelError("a hole in a face that the box has cut lies in none of its pieces")
-        groups[min(around, key=lambda index: float(areas[index]))].append(hole)
-    return list(groups.values())
-
-
-def signed_area(outline: Floats) -> float:
-    """Area in a polygon, shape (k, 2), that runs anticlockwise."""
-    x, y = outline.T
-    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
-
-
-def holds(outline: Floats, place: Floats) -> bool:
-    """Whether a place, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
-    x, y = (outline - place).T
-    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
-    crosses = (y > 0) != (next_y > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = x - y * (next_x - x) / (next_y - y) > 0
-    return bool(np.sum(crosses & beyond) % 2)
-
-
 def _stretches(side: int, curve: int, stops: list[float], nodes: list[Node]) -> list[Arc]:
     count = len(stops) - 1
     return [Arc(side, curve, k, count, stops[k], stops[k + 1], nodes[k], nodes[k + 1]) for k in range(count)]
 
 
-def _composite(first: float, last: float, pieces: int) -> tuple[Floats, Floats]:
-    """Gauss-Legendre points and weights on equal pieces of an interval."""
-    nodes, weights = _rule()
-    half = (last - first) / pieces / 2
-    middles = first + half * (2 * np.arange(pieces) + 1)
-    return (middles[:, np.newaxis] + half * nodes).ravel(), np.tile(half * weights, pieces)
-
-
-@lru_cache
-def _rule() -> tuple[Floats, Floats]:
-    nodes, weights = np.polynomial.legendre.leggauss(_PER_STRETCH)
-    return nodes, weights
+def _on_pieces(arc: Arc, pieces: int) -> tuple[Floats, Floats]:
+    """Gauss points and weights on equal pieces of an arc."""
+    return gauss_points(np.linspace(arc.first, arc.last, pieces + 1), _PER_STRETCH)

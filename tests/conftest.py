@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 import hypothesis
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.nurbs import basis, uniform_knots
+from gyroid_cad.rims import PLANES, Faces
 
 CELL_SIZE = 10.0
 THICKNESS = 0.8
@@ -18,6 +22,19 @@ THICKNESS = 0.8
 # A slow machine is no reason to fail.
 hypothesis.settings.register_profile("patient", deadline=None)
 hypothesis.settings.load_profile("patient")
+
+Floats = NDArray[np.float64]
+Height = Callable[[Floats, Floats], Floats]
+
+
+class Graph(Protocol):
+    """The face z = f(x, y) over [-1, 1]^2, exact for cubics, with levels of some planes by index.
+
+    A weight 1 + lean (u + v / 2) makes it a quotient; then it is exact for quadratics.
+    """
+
+    def __call__(self, height: Height, levels: dict[int, float], lean: float = 0.0) -> Faces: ...
+
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
 
@@ -46,6 +63,22 @@ def kernel_volume() -> Callable[[Any], float]:
         return float(properties.Mass())
 
     return measure
+
+
+@pytest.fixture(scope="session")
+def graph() -> Graph:
+    def face(height: Height, levels: dict[int, float], lean: float = 0.0) -> Faces:
+        knots = uniform_knots(7)
+        at = np.array([knots[k + 1 : k + 4].mean() for k in range(7)])
+        u, v = np.meshgrid(at, at, indexing="ij")
+        weight = 1 + lean * (u + v / 2)
+        values = np.stack([u * weight, v * weight, height(u, v) * weight, weight], axis=-1)
+        inverse = np.linalg.inv(basis(knots, 3, at))
+        control = np.einsum("ia,jb,abk->ijk", inverse, inverse, values)
+        near = np.array([[levels.get(plane, np.nan) for plane in range(len(PLANES))]])
+        return Faces((control[..., :3] / control[..., 3:])[np.newaxis], control[..., 3], knots, near)
+
+    return face
 
 
 @pytest.fixture

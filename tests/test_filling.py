@@ -154,7 +154,8 @@ def test_whole_cells_are_as_dense_as_was_asked_wherever_they_begin() -> None:
         assert fill(box, CELL, density=0.3, origin=origin).report.density == pytest.approx(0.3, rel=1e-6)
 
 
-@pytest.mark.parametrize("part", [ball(), cq.Workplane().box(4, 5, 3).translate((5, 4, 6))], ids=["ball", "box"])
+# No corner of the lattice lies in a side of the box: the lattice would be shifted, and the surface another.
+@pytest.mark.parametrize("part", [ball(), cq.Workplane().box(4, 5, 3).translate((5.3, 4.2, 6.1))], ids=["ball", "box"])
 def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: cq.Workplane, tmp_path: Path) -> None:
     surface, wall = fill(part, CELL, kind="surface", fit=COARSE), fill(part, CELL, 0.05, fit=COARSE)
     report = surface.report
@@ -218,6 +219,19 @@ def test_a_skin_is_kept_and_fused_with_what_fills_the_core() -> None:
     assert made.report.volume == pytest.approx(BALL - 4 / 3 * np.pi * inner**3 + within.report.volume, rel=1e-4)
     assert made.report.smallest_wall == skin
     assert is_valid(made.solid())
+
+
+def test_a_box_with_a_skin_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    box = cq.Workplane().box(7, 8, 6).translate((5, 4, 6))
+    sections, channels = (
+        fill(box, CELL, WALL, kind=kind, fit=COARSE, skin=0.7).report for kind in ("sheet", "channels")
+    )
+    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill: self._by_booleans(infill))
+    booleans = fill(box, CELL, WALL, fit=COARSE, skin=0.7).report
+    assert sections.by_sections
+    assert sections.volume + channels.volume == pytest.approx(7 * 8 * 6, rel=1e-9)
+    assert (sections.volume, sections.area) == pytest.approx((booleans.volume, booleans.area), rel=1e-5)
+    assert (sections.solids, sections.faces) == (booleans.solids, booleans.faces)
 
 
 def test_channels_within_a_skin_are_those_of_the_core() -> None:

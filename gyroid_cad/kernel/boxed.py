@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.Geom import Geom_BSplineCurve, Geom_Plane
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d
 from OCP.TColgp import TColgp_Array1OfPnt2d
-from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SHELL
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.box_caps import Cap, plane_axes
 from gyroid_cad.box_cut import BoxEdge, BoxedWall, BoxFace
 from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry
 from gyroid_cad.kernel.surfaces import kernel_curve, kernel_knots
 from gyroid_cad.nurbs import NurbsCurve
-from gyroid_cad.sections import PLANES, Sections, section_knots
+from gyroid_cad.rims import PLANES
+from gyroid_cad.sections import Sections, section_knots
 
-__all__ = ["realise_boxed"]
+__all__ = ["hollowed_by", "realise_boxed"]
 
 # Between what was measured between stations of a section curve and what the kernel finds elsewhere along it.
 _MARGIN = 2.0
@@ -44,6 +48,17 @@ def realise_boxed(cut: BoxedWall) -> list[TopoDS_Shape]:
     if any(volume <= 0 for volume in cut.volumes):
         raise KernelError("the box leaves a void of the lattice with nothing round it")
     return [_solid(shell) for shell in shells]
+
+
+def hollowed_by(solid: TopoDS_Shape, voids: Iterable[TopoDS_Shape]) -> TopoDS_Solid:
+    """A solid with others, which lie within it and touch neither it nor each other, as its voids."""
+    builder, made = BRep_Builder(), TopoDS_Solid()
+    builder.MakeSolid(made)
+    for shell in parts_of(solid, TopAbs_SHELL):
+        builder.Add(made, shell)
+    for shell in (shell for void in voids for shell in parts_of(void, TopAbs_SHELL)):
+        builder.Add(made, shell.Reversed())
+    return made
 
 
 class _Realisation:

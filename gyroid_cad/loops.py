@@ -1,0 +1,87 @@
+"""Closed loops: links joined end to end, which loops are holes in which, and polygons' areas."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import KernelError
+
+__all__ = ["holds", "linked", "nested", "signed_area"]
+
+Floats = NDArray[np.float64]
+
+
+class _Link(Protocol):
+    @property
+    def start(self) -> Hashable: ...
+
+    @property
+    def end(self) -> Hashable: ...
+
+
+Link = TypeVar("Link", bound=_Link)
+
+
+def linked(links: Sequence[Link], of: str) -> list[list[Link]]:
+    """Links, each from a start to an end, as closed loops.
+
+    Parameters
+    ----------
+    links : sequence
+        Each with a ``start`` and an ``end``.
+    of : str
+        What they bound a remainder of, for the message.
+
+    Raises
+    ------
+    KernelError
+        If they do not link up one for one.
+    """
+    onward = {link.start: link for link in links}
+    if len(onward) < len(links) or onward.keys() != {link.end for link in links}:
+        raise KernelError(f"what the box leaves of {of} does not close")
+    loops = []
+    while onward:
+        loop = [onward.pop(next(iter(onward)))]
+        while loop[-1].end != loop[0].start:
+            loop.append(onward.pop(loop[-1].end))
+        loops.append(loop)
+    return loops
+
+
+def nested(outlines: Sequence[Floats]) -> list[list[int]]:
+    """Outlines (k, 2) that run round what they bound, each with those of its holes.
+
+    Raises
+    ------
+    KernelError
+        If a hole lies in nothing.
+    """
+    areas = np.array([signed_area(outline) for outline in outlines])
+    groups = {index: [index] for index in np.flatnonzero(areas > 0).tolist()}
+    for hole in np.flatnonzero(areas <= 0).tolist():
+        around = [index for index in groups if holds(outlines[index], outlines[hole][0])]
+        if not around:
+            raise KernelError("a hole in a face that the box has cut lies in none of its pieces")
+        groups[min(around, key=lambda index: float(areas[index]))].append(hole)
+    return list(groups.values())
+
+
+def signed_area(outline: Floats) -> float:
+    """Area in a polygon, shape (k, 2), that runs anticlockwise."""
+    x, y = outline.T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
+
+
+def holds(outline: Floats, place: Floats) -> bool:
+    """Whether a place, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
+    x, y = (outline - place).T
+    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
+    crosses = (y > 0) != (next_y > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond = x - y * (next_x - x) / (next_y - y) > 0
+    return bool(np.sum(crosses & beyond) % 2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import prod
@@ -17,6 +16,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.formats import FORMATS, require_meshing, require_schema
 from gyroid_cad.laying import LaidWall, Recipe, laid_wall
 from gyroid_cad.memory import require_memory
+from gyroid_cad.remembered import Remembered
 from gyroid_cad.stages import Progress, tell, timed
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ _FILE_BYTES_PER_CELL = 6_000_000
 _VOLUME_AGREEMENT = 1e-9
 # Of cut cells against whole ones: how closely the section curves are fitted.
 _BOXED_VOLUME_AGREEMENT = 1e-5
-_REMEMBERED_BUILDS = 2
 
 
 class Build:
@@ -191,7 +190,7 @@ def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, a
             write_3mf(*meshed(shape, path, deviation, angle), path)
 
 
-_builds: OrderedDict[Recipe, Build] = OrderedDict()
+_builds: Remembered[Recipe, Build] = Remembered()
 
 
 def build(recipe: Recipe, progress: Progress | None = None) -> Build:
@@ -212,14 +211,12 @@ def build(recipe: Recipe, progress: Progress | None = None) -> Build:
     KernelError
         If the kernel's shape is not closed or does not enclose the right volume.
     """
-    if recipe not in _builds:
+
+    def made() -> Build:
         require_memory(recipe.cells, _SOLID_BYTES_PER_CELL, recipe.settings.control_points)
-        made = Build(laid_wall(recipe, progress), progress)
-        while len(_builds) >= _REMEMBERED_BUILDS:
-            _builds.popitem(last=False)
-        _builds[recipe] = made
-    _builds.move_to_end(recipe)
-    return _builds[recipe]
+        return Build(laid_wall(recipe, progress), progress)
+
+    return _builds.get(recipe, made)
 
 
 def require_settings(

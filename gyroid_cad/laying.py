@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from gyroid_cad.fit import FitSettings
 from gyroid_cad.grading import Grading
 from gyroid_cad.memory import require_memory
 from gyroid_cad.refit import Refit
+from gyroid_cad.remembered import Remembered
 from gyroid_cad.soundness import CLEARANCE_SAMPLES, FOLD_SAMPLES
 from gyroid_cad.stages import Progress, timed
 from gyroid_cad.wall import Wall
@@ -28,7 +28,6 @@ _BYTES_PER_CELL = 500_000
 # Of whole cells that are all alike: they have their nets in common, only the complex grows; writing STL included.
 _BYTES_PER_ALIKE_CELL = 40_000
 _SHIFTS = float(np.abs(PHASES).max())
-_REMEMBERED = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,18 +135,12 @@ def lay_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
     return LaidWall(recipe, complex, wall, refit, seconds)
 
 
-_laid: OrderedDict[Recipe, LaidWall] = OrderedDict()
+_laid: Remembered[Recipe, LaidWall] = Remembered()
 
 
 def laid_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
     """The same; the last few are remembered."""
-    if recipe not in _laid:
-        made = lay_wall(recipe, progress)
-        while len(_laid) >= _REMEMBERED:
-            _laid.popitem(last=False)
-        _laid[recipe] = made
-    _laid.move_to_end(recipe)
-    return _laid[recipe]
+    return _laid.get(recipe, lambda: lay_wall(recipe, progress))
 
 
 def _complex(recipe: Recipe) -> CellComplex:

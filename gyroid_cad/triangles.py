@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import ceil, prod
@@ -16,13 +15,13 @@ from gyroid_cad.mesh.corners import indexed_triangles
 from gyroid_cad.mesh.stl import write_stl
 from gyroid_cad.mesh.three_mf import write_3mf
 from gyroid_cad.mesh.triangulation import triangulated
+from gyroid_cad.remembered import Remembered
 from gyroid_cad.stages import Progress, timed
 
 __all__ = ["TriangleReport", "Triangles", "triangle_report", "triangles"]
 
 # Peak memory of writing 3MF, as measured, rounded up.
 _3MF_BYTES_PER_TRIANGLE = 400
-_REMEMBERED = 2
 
 
 class Triangles:
@@ -158,7 +157,7 @@ def triangle_report(made: Triangles, thickness: float, density: float, volume_ex
     )
 
 
-_made: OrderedDict[tuple[Recipe, float], Triangles] = OrderedDict()
+_made: Remembered[tuple[Recipe, float], Triangles] = Remembered()
 
 
 def triangles(recipe: Recipe, deviation: float, progress: Progress | None = None) -> Triangles:
@@ -180,11 +179,4 @@ def triangles(recipe: Recipe, deviation: float, progress: Progress | None = None
     FitError
         If the fit's edges do not meet those of its neighbours.
     """
-    key = recipe, deviation
-    if key not in _made:
-        made = Triangles(laid_wall(recipe, progress), deviation, progress)
-        while len(_made) >= _REMEMBERED:
-            _made.popitem(last=False)
-        _made[key] = made
-    _made.move_to_end(key)
-    return _made[key]
+    return _made.get((recipe, deviation), lambda: Triangles(laid_wall(recipe, progress), deviation, progress))

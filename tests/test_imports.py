@@ -19,7 +19,7 @@ ROWS = [
     ["errors"],
     ["version"],
     ["arrays", "roots"],
-    ["checks", "stages"],
+    ["checks", "stages", "remembered"],
     ["expressions"],
     ["fields"],
     ["field_makers"],

@@ -25,6 +25,9 @@ class Remembered(Generic[Key, Value]):
         self._most = most
         self._held: OrderedDict[Key, Value] = OrderedDict()
 
+    def __len__(self) -> int:
+        return len(self._held)
+
     def get(self, key: Key, make: Callable[[], Value]) -> Value:
         """What is held for a key, or else what is made now."""
         if key not in self._held:

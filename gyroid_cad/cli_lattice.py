@@ -170,4 +170,4 @@ def _fit_settings(fit: str, control_points: int) -> Any:
 
 def option_name(parameter: str) -> str:
     """How a parameter is called on the command line."""
-    return "-o" if parameter == "output" else "--" + parameter.replace("_", "-")
+    return {"output": "-o", "part": "PART"}.get(parameter, "--" + parameter.replace("_", "-"))

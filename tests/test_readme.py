@@ -10,12 +10,22 @@ from pathlib import Path
 
 import pytest
 
+from examples.light_bracket import bracket
+from gyroid_cad.kernel.step import write_step
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_no_block_is_left_out_of_the_tests() -> None:
+    assert set(re.findall(r"^```(.*)$", README, flags=re.MULTILINE)) == {"sh", "python", ""}
+    assert len(re.findall(r"^```", README, flags=re.MULTILINE)) == 2 * sum(
+        len(blocks(kind)) for kind in ("sh", "python")
+    )
 
 
 def commands() -> list[str]:
@@ -42,6 +52,8 @@ def test_each_python_block_runs(block: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", [c for c in commands() if c.startswith("gyroid-cad")])
 def test_each_shell_command_runs(command: str, tmp_path: Path) -> None:
+    if "bracket.step" in command:
+        write_step(bracket().val().wrapped, tmp_path / "bracket.step")
     done = subprocess.run(
         [sys.executable, "-m", *shlex.split(command.replace("gyroid-cad", "gyroid_cad", 1))],
         cwd=tmp_path,

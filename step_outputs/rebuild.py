@@ -40,6 +40,8 @@ RESULTS = (
     Result("unit_cell_rational.brep", Lattice((1, 1, 1), 10, thickness=0.8, fit=rational_fit())),
     Result("two_cells_cubed.brep", Lattice((2, 2, 2), 10, thickness=0.8)),
     Result("unit_cell_graded.step", Lattice((1, 1, 1), 10, "0.6 + 0.03*x", scale_field="1 + 0.02*y"), "ap242"),
+    Result("diamond_cell.step", Lattice((1, 1, 1), 10, density=0.25, surface="diamond", fit=FitSettings(7))),
+    Result("primitive_cell.step", Lattice((1, 1, 1), 10, density=0.25, surface="primitive")),
     Result("unit_cell.stl", Lattice((1, 1, 1), 10, thickness=0.8), deviation=0.1),
 )
 

@@ -141,7 +141,9 @@ def draw(name: str, views: Iterable[View], size: tuple[int, int]) -> Path:
     width, height, _ = image.GetDimensions()
     pixels = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)[::-1]
     target = FOLDER / f"{name}.png"
-    Image.fromarray(np.ascontiguousarray(pixels)).quantize(_PALETTE, Image.Quantize.MAXCOVERAGE).save(target, optimize=True)
+    Image.fromarray(np.ascontiguousarray(pixels)).quantize(_PALETTE, Image.Quantize.MAXCOVERAGE).save(
+        target, optimize=True
+    )
     return target
 
 

@@ -1,0 +1,110 @@
+"""What docs/ says is so: its code runs, prints what the page says, and its pictures and links are there.
+
+``mkdocs build --strict`` checks the links anew, and the references to the API; CI calls it by itself.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from gyroid_cad.cli import main
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+IMAGES = sorted((DOCS / "images").iterdir())
+MOST_BYTES = 4_000_000
+_FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(DOCS).as_posix()
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """Language and text of every fenced block, in their order."""
+    return _FENCE.findall(page.read_text())
+
+
+def with_language(language: str) -> list[Path]:
+    return [page for page in PAGES if any(found == language for found, _ in blocks(page))]
+
+
+@pytest.fixture
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", with_language("python"), ids=name_of)
+def test_the_code_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_says(
+    page: Path, in_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # In this process: CadQuery and build123d take seconds to load. The three tutorials take three to eight seconds of
+    # one core each, for they cut real parts with the kernel's booleans; all the other pages together, four.
+    (in_folder / "lattice.toml").write_text("\n".join(text for language, text in blocks(page) if language == "toml"))
+    namespace = {"__name__": "__main__"}
+    printed = None
+    for number, (language, text) in enumerate(blocks(page)):
+        if language == "python":
+            exec(compile(text, f"{name_of(page)}, block {number + 1}", "exec"), namespace)
+            printed = capsys.readouterr().out
+        elif language == "text" and printed is not None:
+            assert printed == text
+            printed = None
+
+
+@pytest.mark.parametrize("page", with_language("sh"), ids=name_of)
+def test_the_commands_of_a_page_run(page: Path, in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for language, text in blocks(page):
+        if language == "toml":
+            (in_folder / "lattice.toml").write_text(text)
+        for command in text.splitlines() if language == "sh" else ():
+            program, *arguments = shlex.split(command)
+            if program == "gyroid-cad":
+                assert main(arguments) == 0, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("tutorial", sorted((DOCS / "tutorials").glob("*.md")), ids=name_of)
+def test_a_tutorial_says_what_its_code_prints(tutorial: Path) -> None:
+    languages = [language for language, _ in blocks(tutorial)]
+    assert ("python", "text") in list(zip(languages, languages[1:], strict=False))
+
+
+@pytest.mark.parametrize("image", IMAGES, ids=lambda path: path.name)
+def test_a_figure_is_a_png_or_svg_that_a_page_shows(image: Path) -> None:
+    start = image.read_bytes()[:400]
+    assert start.startswith(b"\x89PNG\r\n") if image.suffix == ".png" else b"<svg" in start
+    assert any(f"images/{image.name})" in page.read_text() for page in PAGES)
+
+
+def test_all_the_papers_figures_from_2_to_19_are_there_and_small() -> None:
+    numbers = {int(found[1]) for image in IMAGES if (found := re.match(r"fig_(\d\d)", image.name))}
+    assert numbers == set(range(2, 20))
+    assert sum(image.stat().st_size for image in IMAGES) < MOST_BYTES
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_the_links_of_a_page_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if target.startswith(("http://", "https://")):
+            continue
+        path, _, heading = unquote(target).partition("#")
+        # The site has the README's pictures in its folder "gallery".
+        if "gallery/" in path:
+            assert (ROOT / "images" / Path(path).name).is_file(), target
+            continue
+        aim = (page.parent / path).resolve() if path else page
+        assert aim.is_file(), target
+        if heading:
+            assert heading in {slug(line) for line in re.findall(r"^#+ (.*)$", aim.read_text(), flags=re.MULTILINE)}, target
+
+
+def slug(title: str) -> str:
+    """As Python-Markdown's toc makes them."""
+    return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", title).strip().lower())

@@ -7,12 +7,18 @@ from __future__ import annotations
 
 import re
 import shlex
+from importlib import import_module
+from math import atan2, degrees, sqrt
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from scipy.special import ellipk
 
 from gyroid_cad.cli import main
+from gyroid_cad.families import SURFACES
+from gyroid_cad.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.weierstrass import CORNER
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -102,9 +108,60 @@ def test_the_links_of_a_page_lead_somewhere(page: Path) -> None:
         aim = (page.parent / path).resolve() if path else page
         assert aim.is_file(), target
         if heading:
-            assert heading in {slug(line) for line in re.findall(r"^#+ (.*)$", aim.read_text(), flags=re.MULTILINE)}, target
+            assert heading in {slug(line) for line in re.findall(r"^#+ (.*)$", aim.read_text(), flags=re.MULTILINE)}, (
+                target
+            )
 
 
 def slug(title: str) -> str:
     """As Python-Markdown's toc makes them."""
     return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", title).strip().lower())
+
+
+def test_the_fits_table_is_what_fit_report_measures() -> None:
+    page = (DOCS / "mathematics" / "fit.md").read_text()
+    fits = {"the paper's, 10 × 10": FitSettings.paper()}
+    fits |= {f"ours, {n} × {n}": FitSettings(n) for n in (10, 14, 20)}
+    for name, settings in fits.items():
+        found = fit_report(fit_patch(settings))
+        gap = "below 1e-15" if found.edge_gap < 1e-15 else f"{found.edge_gap:.1e}"
+        cells = [name, f"{found.max_distance:.1e}", f"{found.max_normal_angle:.3f}°"]
+        cells += [f"{found.max_mean_curvature:.3g}", f"{found.rms_mean_curvature:.3g}", gap]
+        assert f"| {' | '.join(cells)} |" in page
+
+
+def test_the_level_set_is_as_far_from_the_gyroid_as_the_page_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(DOCS / "figures"))
+    found = import_module("level_set").measures()
+    row = [f"{found.max_mean_curvature:.3g}", f"{found.rms_mean_curvature:.3f}", f"{found.max_distance:.4f} L"]
+    page = (DOCS / "mathematics" / "figures.md").read_text()
+    assert f"| level set | {' | '.join(row)} |" in page
+    assert f"up to {found.max_normal_angle:.2f}° off" in page
+
+
+def test_the_papers_eq_1_is_wrong_by_what_the_errata_say() -> None:
+    page = (DOCS / "mathematics" / "errata.md").read_text()
+    # In the corner both integrals are complete: their arguments are 1.
+    square = CORNER**2
+    quartic = square**2 + 4 * square + 1
+    assert 2 * sqrt(2) * CORNER / sqrt(quartic) == pytest.approx(1, rel=1e-14)
+    assert (2 + sqrt(3)) * square == pytest.approx(4 * square / (square**2 + 1)) == pytest.approx(1, rel=1e-14)
+    printed = 2 * sqrt(2) * CORNER / quartic, 4 * square / sqrt(square**2 + 1)
+    assert f"as printed it is {printed[0]:.3f}" in page
+    assert f"passes 1 in the corner, {printed[1]:.3f}" in page
+    # Eq. (22) reads the second argument as the modulus, of which scipy takes the square.
+    angles = [degrees(atan2(ellipk(m), ellipk(n))) for m, n in ((1 / 16, 9 / 16), (1 / 4, 3 / 4))]
+    assert f"θ would be {angles[0]:.2f}°, not {angles[1]:.2f}°" in page
+
+
+def test_the_families_table_is_the_codes() -> None:
+    rows = {
+        "patches per cell": lambda surface: f"{len(surface.cell)}",
+        "area per cell": lambda surface: f"{surface.tube.area:.7f} L²",
+        "Euler characteristic per cell": lambda surface: f"{surface.tube.euler_characteristic:.0f}",
+        "wall below": lambda surface: f"{surface.tube.largest_thickness:.5f} L",
+    }
+    page = (DOCS / "mathematics" / "families.md").read_text()
+    for name, shown in rows.items():
+        cells = [shown(SURFACES[surface]) for surface in ("diamond", "gyroid", "primitive")]
+        assert f"| {name} | {' | '.join(cells)} |" in page

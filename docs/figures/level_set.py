@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -9,6 +10,12 @@ import vtk
 from drawing import GREY, Floats, Sheet
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
+from gyroid_cad.patch import smooth
+
+# What brings the exact patch, centred at the origin, onto the level set: a half-turn about x, after a translation in
+# bounding-cell lengths, which are pi.
+_TURN, _SHIFT = np.diag([1.0, -1.0, -1.0]), np.array([1, 1 / 2, 1 / 4])
+_PATCH_SAMPLES = 41
 # Samples along each axis, for a whole period.
 _SAMPLES = 64
 _PROJECTIONS = 6
@@ -36,6 +43,32 @@ def level_set_triangles(reach: float) -> tuple[Floats, Floats]:
     data = contour.GetOutput()
     cells = vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3)
     return vtk_to_numpy(data.GetPoints().GetData()).astype(float), cells
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """How far the level set is from the gyroid; lengths in cell sizes L, angles in degrees, curvature in 1/L."""
+
+    max_distance: float
+    max_normal_angle: float
+    max_mean_curvature: float
+    rms_mean_curvature: float
+
+
+def measures() -> Measures:
+    """Of the place on the level set next to each place of an exact patch."""
+    along = np.linspace(-1, 1, _PATCH_SAMPLES)
+    points, normals = (array.reshape(-1, 3) for array in smooth(along[:, np.newaxis], along))
+    exact, exact_normals = pi * _TURN @ (points + _SHIFT).T, _TURN @ normals.T
+    near = on_level_set(exact)
+    unit = gradient(near) / np.linalg.norm(gradient(near), axis=0)
+    curvature = 2 * pi * mean_curvature(near)
+    return Measures(
+        max_distance=float(np.linalg.norm(near - exact, axis=0).max()) / (2 * pi),
+        max_normal_angle=float(np.degrees(np.arccos(np.abs(np.sum(unit * exact_normals, axis=0)).min()))),
+        max_mean_curvature=float(np.abs(curvature).max()),
+        rms_mean_curvature=float(np.sqrt(np.mean(curvature**2))),
+    )
 
 
 def value(places: Floats) -> Floats:

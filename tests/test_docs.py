@@ -16,6 +16,7 @@ from urllib.parse import unquote
 import pytest
 from scipy.special import ellipk
 
+import gyroid_cad
 from gyroid_cad.cli import main
 from gyroid_cad.families import SURFACES
 from gyroid_cad.fit import FitSettings, fit_patch, fit_report
@@ -52,8 +53,8 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_code_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_says(
     page: Path, in_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # In this process: CadQuery and build123d take seconds to load. The three tutorials take three to eight seconds of
-    # one core each, for they cut real parts with the kernel's booleans; all the other pages together, four.
+    # In this process: CadQuery and build123d take seconds to load. Two tutorials take four to six seconds each, for they
+    # cut real parts with the kernel; all the other pages together, as many besides what is loaded.
     (in_folder / "lattice.toml").write_text("\n".join(text for language, text in blocks(page) if language == "toml"))
     namespace = {"__name__": "__main__"}
     printed = None
@@ -166,3 +167,19 @@ def test_the_families_table_is_the_codes() -> None:
     for name, shown in rows.items():
         cells = [shown(SURFACES[surface]) for surface in ("diamond", "gyroid", "primitive")]
         assert f"| {name} | {' | '.join(cells)} |" in page
+
+
+def test_every_public_name_has_its_place_in_the_reference() -> None:
+    shown = "\n".join(page.read_text() for page in (DOCS / "reference").glob("*.md"))
+    names = set(re.findall(r"^::: gyroid_cad\.(\w+)$", shown, flags=re.MULTILINE))
+    assert names == set(gyroid_cad.__all__) - {"__version__"}
+    for module in ("cq_plugin", "bd_objects"):
+        public = import_module(f"gyroid_cad.{module}").__all__
+        assert set(re.findall(rf"^::: gyroid_cad\.{module}\.(\w+)$", shown, flags=re.MULTILINE)) == set(public)
+
+
+def test_nothing_in_the_site_is_fetched_from_elsewhere() -> None:
+    settings = (ROOT / "mkdocs.yml").read_text()
+    assert "font: false" in settings
+    assert "http" not in settings
+    assert not re.findall(r"<(?:script|link|img|iframe)|!\[.*?\]\(http", "".join(page.read_text() for page in PAGES))

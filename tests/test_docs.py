@@ -53,8 +53,8 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_code_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_says(
     page: Path, in_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # In this process: CadQuery and build123d take seconds to load. Two tutorials take four to six seconds each, for they
-    # cut real parts with the kernel; all the other pages together, as many besides what is loaded.
+    # In this process: CadQuery and build123d take seconds to load. Two tutorials take four to six seconds each, for
+    # they cut real parts with the kernel; all the other pages together, as many besides what is loaded.
     (in_folder / "lattice.toml").write_text("\n".join(text for language, text in blocks(page) if language == "toml"))
     namespace = {"__name__": "__main__"}
     printed = None

@@ -13,8 +13,9 @@ import cells
 import meshes
 import patches
 import plane
+import tutorials
 
-MODULES: tuple[ModuleType, ...] = (plane, patches, cells, meshes)
+MODULES: tuple[ModuleType, ...] = (plane, patches, cells, meshes, tutorials)
 
 
 def main(names: list[str]) -> None:

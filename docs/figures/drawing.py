@@ -31,7 +31,7 @@ ABOVE, ASLANT = (0.0, 0.0, 1.0), (1.6, -3.0, 1.9)
 
 _MARGIN, _LETTERS, _CAPTION_HEIGHT = 1.06, 17, 0.09
 # A PNG with a palette of so many colours is a third as large, and looks the same.
-_PALETTE = 96
+_PALETTE = 192
 # Cosine of the angle at which a patch is still seen well.
 _FACING = 0.6
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
+from gyroid_cad.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
 from gyroid_cad.block_maps import as_map, space_over
 from gyroid_cad.build import Build, build, require_settings
 from gyroid_cad.checks import finite_number, positive_number
@@ -274,6 +275,7 @@ class Lattice:
         deviation: float | None = None,
         angle: float = 15.0,
         progress: Progress | None = None,
+        instances: bool = False,
     ) -> None:
         """Write files; each path's ending chooses STEP (.step, .stp), BREP (.brep), STL (.stl) or 3MF (.3mf).
 
@@ -294,6 +296,10 @@ class Lattice:
             of whole patches are as large as the deviation lets them be.
         progress : callable, optional
             Called with (stage, done, total).
+        instances : bool
+            Write STEP files as :meth:`assembly`: one cell and its places, not one solid. Hundreds of times smaller
+            where there are many cells; to look at, to lay out, to pattern on. Its cells touch and are not fused: for
+            whatever needs one body (booleans, meshing, printing) write the solid.
 
         Raises
         ------
@@ -302,6 +308,11 @@ class Lattice:
         targets = require_formats(paths)
         if deviation is not None:
             deviation = finite_number("deviation", deviation, _LENGTH)
+        if instances:
+            require_assembly_formats(targets)
+            require_settings((1, 1, 1), schema, deviation, angle)
+            self.assembly(progress).write(targets, schema, progress)
+            return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
         require_settings(self.cells, schema, deviation, angle, solid=bool(solid))
@@ -310,6 +321,27 @@ class Lattice:
             built.write(solid, schema, self._deviation(deviation), angle, progress)
         if flat:
             self.triangles(deviation, progress).write(flat, progress)
+
+    def assembly(self, progress: Progress | None = None) -> Assembly:
+        """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with (stage, done, total).
+
+        Raises
+        ------
+        ParameterError
+            If the cells differ, or are trimmed.
+        FitError, KernelError
+            As of :meth:`solid`.
+        """
+        return assembly(self._recipe(), progress)
+
+    def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
+        """Make the assembly if it isn't yet, and say what it is; nothing is written."""
+        return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
         """Whether the solid must be built for files with these endings: not for triangles of whole patches."""

@@ -50,7 +50,7 @@ def print_assembly(summary: dict[str, Any]) -> None:
         ("wall", f"{summary['thickness']:.6g} mm, density {summary['density']:.5f}"),
         (
             "instances",
-            f"{summary['instances']:,} of one solid of {summary['faces']} faces (valid and closed), not fused",
+            f"{summary['instances']:,} of one valid and closed solid of {summary['faces']} faces, not fused",
         ),
         ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),

@@ -38,7 +38,9 @@ from gyroid_cad.mesh.hexahedra import Mesh
 from gyroid_cad.mesh.periodic import PeriodicPairs, periodic_pairs
 from gyroid_cad.mesh.volumes import VolumePatches
 from gyroid_cad.meshing import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
+from gyroid_cad.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.paper import paper_units
+from gyroid_cad.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
 from gyroid_cad.report import LatticeReport, report_of
 from gyroid_cad.stages import Progress, timed
 from gyroid_cad.triangles import TriangleReport, Triangles, triangle_report, triangles
@@ -435,6 +437,53 @@ class Lattice:
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
         return periodic_pairs(mesh, self.cell_size)
+
+    def picture(self, size: tuple[int, int] = SIZE, camera: Corner = CAMERA) -> bytes:
+        """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
+
+        Parameters
+        ----------
+        size : tuple of int
+            Width and height in pixels.
+        camera : tuple of float
+            Direction from the lattice to the viewer.
+
+        Raises
+        ------
+        ParameterError
+            Also of more cells than a picture could show.
+        SoundnessError, FitError, KernelError
+        """
+        size, camera = require_view(size, camera)
+        if prod(self.cells) > self._most_drawn:
+            raise ParameterError("cells", self.cells, f"at most {self._most_drawn} cells in all in a picture")
+        if self.trim:
+            return shape_picture(self.solid(), size, camera)
+        return wall_picture(self.laid().wall, size, camera)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
+        return mime_bundle(f"{self.surface} lattice", self._shown, self.picture)
+
+    @property
+    def _most_drawn(self) -> int:
+        return MOST_DRAWN_PATCHES // len(self.minimal_surface.cell)
+
+    def _shown(self) -> list[tuple[str, str]]:
+        """What a notebook says of it, beside its picture."""
+        rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
+        drawn = prod(self.cells) <= self._most_drawn
+        # What varies over so many cells would take long to measure.
+        if self.uniform or drawn:
+            rows += [
+                ("wall", f"{self.wall_thickness:.4g} mm{'' if self.uniform else ' on average'}"),
+                ("density", f"{self.volume_fraction:.4g}"),
+                ("volume", f"{self.exact_volume:.5g} mm3"),
+            ]
+        if drawn:
+            low, high = self.bounding_box()
+            extent = " x ".join(f"{b - a:.5g}" for a, b in zip(low, high, strict=True))
+            rows.append(("extent", f"{extent} mm"))
+        return rows
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files."""

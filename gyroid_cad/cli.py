@@ -14,6 +14,7 @@ import click
 from gyroid_cad.cli_fill import fill_command
 from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name, printed_options
 from gyroid_cad.cli_mesh import mesh_command, volumes_command
+from gyroid_cad.cli_view import view_command
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.tables import print_built, print_table, shown_progress
 from gyroid_cad.version import __version__
@@ -114,6 +115,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
 commands.add_command(fill_command)
 commands.add_command(mesh_command)
 commands.add_command(volumes_command)
+commands.add_command(view_command)
 
 
 @commands.command("fit-report")
@@ -187,7 +189,7 @@ def _fail(message: str, status: int) -> int:
 
 
 def _with_option_name(problem: ParameterError) -> str:
-    if not problem.parameter.isidentifier() or problem.parameter == "config":
+    if not problem.parameter.isidentifier() or problem.parameter in ("config", "file"):
         return str(problem)
     return str(problem).replace(problem.parameter, option_name(problem.parameter), 1)
 

@@ -31,7 +31,7 @@ from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentToo
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.step import fill_header, product_name, step_of_kernel
 
-__all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "write_assembly"]
+__all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "write_assembly"]
 
 # Of those that STEP knows by name (draughting_pre_defined_colour), so that no reader rounds them.
 YELLOW, RED, GREEN = Quantity_NOC_YELLOW, Quantity_NOC_RED, Quantity_NOC_GREEN
@@ -97,7 +97,7 @@ def write_assembly(
     """
     product = product_name(path, name)
     with step_of_kernel(path, schema, product) as raw:
-        document = _document()
+        document = new_document()
         _fill(document, part, places, product)
         writer = STEPCAFControl_Writer()
         if not writer.Transfer(document, STEPControl_AsIs):
@@ -108,7 +108,8 @@ def write_assembly(
             raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
 
 
-def _document() -> TDocStd_Document:
+def new_document() -> TDocStd_Document:
+    """An empty document of the kernel's, with lengths in mm."""
     document = TDocStd_Document(TCollection_ExtendedString(_BINARY_DOCUMENT))
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, _MILLIMETRE)

@@ -24,7 +24,7 @@ from gyroid_cad.formats import require_schema
 from gyroid_cad.kernel.step_text import compact_step
 from gyroid_cad.version import __version__
 
-__all__ = ["fill_header", "product_name", "read_step", "step_of_kernel", "write_step"]
+__all__ = ["fill_header", "no_messages", "product_name", "read_step", "step_of_kernel", "write_step"]
 
 
 def write_step(
@@ -119,7 +119,7 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     ExportError
         If the file is missing, not STEP, or holds no shape.
     """
-    with _no_messages():
+    with no_messages():
         reader = STEPControl_Reader()
         if reader.ReadFile(str(path)) != IFSelect_RetDone:
             raise ExportError(f"{path} could not be read as STEP")
@@ -193,7 +193,7 @@ def _silenced_messages() -> Iterator[None]:
 
 
 @contextmanager
-def _no_messages() -> Iterator[None]:
+def no_messages() -> Iterator[None]:
     """Keep all that the kernel says to itself: what is wrong with a file is ours to tell."""
     messenger = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -117,10 +118,13 @@ def has_display() -> bool:
 
 def can_draw_off_screen() -> bool:
     """Whether VTK finds what it draws with, as tried in a process of its own: where it finds nothing it ends it."""
-    if has_display():
-        return True
-    tried = subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, check=False)
-    return tried.returncode == 0
+    return has_display() or _succeeds(_TRIAL)
+
+
+@lru_cache(maxsize=4)
+def _succeeds(program: str) -> bool:
+    """Whether a program runs to its end in a process of its own; it is tried once."""
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode == 0
 
 
 def _require_means(off_screen: bool) -> None:

@@ -187,6 +187,15 @@ def test_an_assembly_is_reported_as_one_and_holds_every_cell(capsys: Captured, t
     assert any(line.startswith("instances") and "6 of one valid and closed solid" in line for line in lines)
 
 
+def test_the_config_of_an_assembly_makes_the_same_assembly(capsys: Captured, tmp_path: Path) -> None:
+    given = [*ONE_CELL, *WALL, *COARSE, "-o", tmp_path / "a.step"]
+    printed = in_process(capsys, "build", *given, "--instances", "--print-config").out
+    assert "instances = true" in printed
+    assert "instances" not in in_process(capsys, "build", *given, "--print-config").out
+    (tmp_path / "lattice.toml").write_text(printed)
+    assert json.loads(in_process(capsys, "build", tmp_path / "lattice.toml", "--json").out)["instances"] == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from benchmarks import (
     accuracy,
+    assembly,
     filling,
     grading,
     memory,
@@ -32,6 +33,7 @@ def main(arguments: Sequence[str] = ()) -> bool:
     cells = "5" if quick else "10"
     results = [
         accuracy.main(),
+        assembly.main(["--quick"] if quick else []),
         filling.main(["--quick"] if quick else []),
         grading.main(),
         meshes.main(),

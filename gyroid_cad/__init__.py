@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
+    from gyroid_cad.assembly import Assembly, AssemblyReport
     from gyroid_cad.block_maps import Bend, Cylinder, Sphere, Twist
     from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SoundnessError
     from gyroid_cad.field_makers import (
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
     from gyroid_cad.triangles import TriangleReport
 
 __all__ = [
+    "Assembly",
+    "AssemblyReport",
     "Bend",
     "Cylinder",
     "ExportError",
@@ -83,6 +86,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "assembly": ("Assembly", "AssemblyReport"),
     "block_maps": ("Bend", "Cylinder", "Sphere", "Twist"),
     "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"),
     "fields": ("Field",),

@@ -19,6 +19,8 @@ _OWN_OPTIONS = ("thickness", "density", "scale_field")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "help"}
+# Of the files that "build" writes: other commands that take the same lattice pass over them.
+_BUILD_KEYS, _BUILD_FLAGS = ("output", "schema", "deviation", "angle", "instances"), ("instances",)
 
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
@@ -26,7 +28,9 @@ def _defaults_from_file(context: click.Context, parameter: click.Parameter, path
     if path is not None and path.lower().endswith(_CONFIG_ENDING):
         from gyroid_cad.config import read_config
 
-        values = read_config(path, {p.name for p in context.command.params if p.name} - _NO_KEYS)
+        named = {p.name: p for p in context.command.params if p.name and p.name not in _NO_KEYS}
+        flags = {name for name, option in named.items() if getattr(option, "is_flag", False)}
+        values = read_config(path, {*named, *_BUILD_KEYS}, {*flags, *_BUILD_FLAGS})
         if isinstance(values.get("output"), str):
             values["output"] = [values["output"]]
         context.default_map = values

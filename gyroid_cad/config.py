@@ -15,7 +15,7 @@ __all__ = ["printed_config", "read_config"]
 _LARGEST_FILE = 1_000_000
 
 
-def read_config(path: str, known: Iterable[str]) -> dict[str, Any]:
+def read_config(path: str, known: Iterable[str], flags: Iterable[str] = ()) -> dict[str, Any]:
     """What a file says, every number as text, to be read as the command line is.
 
     Parameters
@@ -23,6 +23,8 @@ def read_config(path: str, known: Iterable[str]) -> dict[str, Any]:
     path : str
     known : iterable of str
         Keys that are understood.
+    flags : iterable of str
+        Those among them that are true or false.
 
     Returns
     -------
@@ -32,9 +34,10 @@ def read_config(path: str, known: Iterable[str]) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        If the file can't be read, is no TOML, or has an unknown key or a value that is neither number nor text.
+        If the file can't be read, is no TOML, or has an unknown key, or a value that is neither number nor text nor,
+        of a flag, true or false.
     """
-    known = sorted(known)
+    known, flags = sorted(known), set(flags)
     try:
         if Path(path).stat().st_size > _LARGEST_FILE:
             raise ParameterError("config", path, f"a TOML file of at most {_LARGEST_FILE:,} bytes")
@@ -48,6 +51,10 @@ def read_config(path: str, known: Iterable[str]) -> dict[str, Any]:
             near = difflib.get_close_matches(key.replace("-", "_").lower(), known, n=1, cutoff=0.5)
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
             raise ParameterError(f"{path}: {key}", value, f"a known key; {hint}")
+        if key in flags:
+            if not isinstance(value, bool):
+                raise ParameterError(f"{path}: {key}", value, "true or false")
+            continue
         parts = value if isinstance(value, list) else [value]
         if not parts or not all(isinstance(part, str | int | float) and not isinstance(part, bool) for part in parts):
             raise ParameterError(f"{path}: {key}", value, "a number or text, or a list of them")
@@ -57,19 +64,19 @@ def read_config(path: str, known: Iterable[str]) -> dict[str, Any]:
 
 
 def printed_config(values: Mapping[str, Any]) -> str:
-    """TOML that :func:`read_config` reads back; what is None or empty is left out.
+    """TOML that :func:`read_config` reads back; what is None, empty or not the case is left out.
 
     Parameters
     ----------
     values : mapping
-        Of numbers, text, and sequences of them.
+        Of numbers, text, truths, and sequences of them.
     """
     import tomli_w
 
     given = {
         key: list(value) if isinstance(value, tuple) else _number_or_text(value)
         for key, value in values.items()
-        if value is not None and value != ()
+        if value is not None and value != () and value is not False
     }
     return tomli_w.dumps(given)
 

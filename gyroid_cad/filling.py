@@ -23,6 +23,8 @@ from gyroid_cad.formats import FORMATS, TRIANGLE_FORMATS, require_formats
 from gyroid_cad.infill import Infill, block_infill, endless_infill
 from gyroid_cad.lattice import USUAL_TOLERANCE, Lattice
 from gyroid_cad.limits import require_cell_size, sound_tolerance
+from gyroid_cad.notebook import MimeBundle, mime_bundle, shape_picture
+from gyroid_cad.picture import CAMERA, SIZE, require_view
 from gyroid_cad.regions import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.stages import Progress
 
@@ -124,6 +126,26 @@ class Filled:
 
         shapes = list(self.domains.values())
         return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
+
+    def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
+        """The filled part drawn, as a PNG file, as :meth:`gyroid_cad.Lattice.picture` draws a lattice.
+
+        Raises
+        ------
+        ParameterError, ExportError
+        """
+        return shape_picture(self.solid(), *require_view(size, camera))
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
+        report = self.report
+        rows = [
+            ("kind", f"{report.kind}, cells of {report.cell_size:g} mm"),
+            ("solids, faces", f"{report.solids}, {report.faces}"),
+            ("volume", f"{report.volume:.5g} mm3 of {report.part_volume:.5g}, density {report.density:.4g}"),
+            ("surface", f"{report.area:.5g} mm2"),
+            *([] if report.mass is None else [("mass", f"{report.mass:.4g} g of {report.part_mass:.4g} g")]),
+        ]
+        return mime_bundle("filled part", lambda: rows, self.picture)
 
     def write(
         self,

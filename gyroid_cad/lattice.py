@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
+from gyroid_cad.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
 from gyroid_cad.block_maps import as_map, space_over
 from gyroid_cad.build import Build, build, require_settings
 from gyroid_cad.checks import finite_number, positive_number
@@ -37,7 +38,9 @@ from gyroid_cad.mesh.hexahedra import Mesh
 from gyroid_cad.mesh.periodic import PeriodicPairs, periodic_pairs
 from gyroid_cad.mesh.volumes import VolumePatches
 from gyroid_cad.meshing import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
+from gyroid_cad.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.paper import paper_units
+from gyroid_cad.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
 from gyroid_cad.report import LatticeReport, report_of
 from gyroid_cad.stages import Progress, timed
 from gyroid_cad.triangles import TriangleReport, Triangles, triangle_report, triangles
@@ -274,6 +277,7 @@ class Lattice:
         deviation: float | None = None,
         angle: float = 15.0,
         progress: Progress | None = None,
+        instances: bool = False,
     ) -> None:
         """Write files; each path's ending chooses STEP (.step, .stp), BREP (.brep), STL (.stl) or 3MF (.3mf).
 
@@ -294,6 +298,10 @@ class Lattice:
             of whole patches are as large as the deviation lets them be.
         progress : callable, optional
             Called with (stage, done, total).
+        instances : bool
+            Write STEP files as :meth:`assembly`: one cell and its places, not one solid. Hundreds of times smaller
+            where there are many cells; to look at, to lay out, to pattern on. Its cells touch and are not fused: for
+            whatever needs one body (booleans, meshing, printing) write the solid.
 
         Raises
         ------
@@ -302,6 +310,11 @@ class Lattice:
         targets = require_formats(paths)
         if deviation is not None:
             deviation = finite_number("deviation", deviation, _LENGTH)
+        if instances:
+            require_assembly_formats(targets)
+            require_settings((1, 1, 1), schema, deviation, angle)
+            self.assembly(progress).write(targets, schema, progress)
+            return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
         require_settings(self.cells, schema, deviation, angle, solid=bool(solid))
@@ -310,6 +323,27 @@ class Lattice:
             built.write(solid, schema, self._deviation(deviation), angle, progress)
         if flat:
             self.triangles(deviation, progress).write(flat, progress)
+
+    def assembly(self, progress: Progress | None = None) -> Assembly:
+        """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with (stage, done, total).
+
+        Raises
+        ------
+        ParameterError
+            If the cells differ, or are trimmed.
+        FitError, KernelError
+            As of :meth:`solid`.
+        """
+        return assembly(self._recipe(), progress)
+
+    def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
+        """Make the assembly if it isn't yet, and say what it is; nothing is written."""
+        return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
         """Whether the solid must be built for files with these endings: not for triangles of whole patches."""
@@ -403,6 +437,53 @@ class Lattice:
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
         return periodic_pairs(mesh, self.cell_size)
+
+    def picture(self, size: tuple[int, int] = SIZE, camera: Corner = CAMERA) -> bytes:
+        """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
+
+        Parameters
+        ----------
+        size : tuple of int
+            Width and height in pixels.
+        camera : tuple of float
+            Direction from the lattice to the viewer.
+
+        Raises
+        ------
+        ParameterError
+            Also of more cells than a picture could show.
+        SoundnessError, FitError, KernelError
+        """
+        size, camera = require_view(size, camera)
+        if prod(self.cells) > self._most_drawn:
+            raise ParameterError("cells", self.cells, f"at most {self._most_drawn} cells in all in a picture")
+        if self.trim:
+            return shape_picture(self.solid(), size, camera)
+        return wall_picture(self.laid().wall, size, camera)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
+        return mime_bundle(f"{self.surface} lattice", self._shown, self.picture)
+
+    @property
+    def _most_drawn(self) -> int:
+        return MOST_DRAWN_PATCHES // len(self.minimal_surface.cell)
+
+    def _shown(self) -> list[tuple[str, str]]:
+        """What a notebook says of it, beside its picture."""
+        rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
+        drawn = prod(self.cells) <= self._most_drawn
+        # What varies over so many cells would take long to measure.
+        if self.uniform or drawn:
+            rows += [
+                ("wall", f"{self.wall_thickness:.4g} mm{'' if self.uniform else ' on average'}"),
+                ("density", f"{self.volume_fraction:.4g}"),
+                ("volume", f"{self.exact_volume:.5g} mm3"),
+            ]
+        if drawn:
+            low, high = self.bounding_box()
+            extent = " x ".join(f"{b - a:.5g}" for a, b in zip(low, high, strict=True))
+            rows.append(("extent", f"{extent} mm"))
+        return rows
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files."""

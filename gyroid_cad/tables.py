@@ -8,6 +8,8 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 __all__ = [
+    "print_assembly",
+    "print_built",
     "print_fill",
     "print_mesh",
     "print_summary",
@@ -21,6 +23,40 @@ Progress = Callable[[str, int, int], None]
 
 # Columns of a pipe, which has none.
 _UNWRAPPED = 100_000
+
+
+def print_built(summary: dict[str, Any]) -> None:
+    """Print the report of whatever a lattice was built as."""
+    if "triangles" in summary:
+        print_triangles(summary)
+    elif "instances" in summary:
+        print_assembly(summary)
+    else:
+        print_summary(summary)
+
+
+def print_assembly(summary: dict[str, Any]) -> None:
+    """Print a lattice's report as an assembly, its files and the time it took.
+
+    Parameters
+    ----------
+    summary : dict
+        The report's values, with ``files`` and ``seconds["total"]``.
+    """
+    nx, ny, nz = summary["cells"]
+    error = summary["volume"] / summary["volume_exact"] - 1
+    rows = [
+        ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
+        ("wall", f"{summary['thickness']:.6g} mm, density {summary['density']:.5f}"),
+        (
+            "instances",
+            f"{summary['instances']:,} of one valid and closed solid of {summary['faces']} faces, not fused",
+        ),
+        ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
+        *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
+        ("time", f"{summary['seconds']['total']:.2f} s"),
+    ]
+    print_table(None, rows)
 
 
 def print_summary(summary: dict[str, Any]) -> None:

@@ -174,6 +174,28 @@ def test_files_of_triangles_alone_are_reported_as_triangles(capsys: Captured, tm
     assert any(str(tmp_path / "b.3mf") in line for line in lines)
 
 
+def test_an_assembly_is_reported_as_one_and_holds_every_cell(capsys: Captured, tmp_path: Path) -> None:
+    given = ["--cells", "2", "1", "3", "--cell-size", "10", *WALL, *COARSE, "-o", tmp_path / "a.step", "--instances"]
+    summary = json.loads(in_process(capsys, "build", *given, "--json").out)
+    report = Lattice((2, 1, 3), 10.0, 0.8, fit=FitSettings(5)).assembly_report().as_dict()
+    assert list(summary) == [*report, "files"]
+    for key in set(report) - {"seconds", "cells"}:
+        assert summary[key] == report[key]
+    assert summary["instances"] == topology(read_step(tmp_path / "a.step")).solids == 6
+    assert summary["files"] == [{"path": str(tmp_path / "a.step"), "bytes": (tmp_path / "a.step").stat().st_size}]
+    lines = in_process(capsys, "build", *given).out.splitlines()
+    assert any(line.startswith("instances") and "6 of one valid and closed solid" in line for line in lines)
+
+
+def test_the_config_of_an_assembly_makes_the_same_assembly(capsys: Captured, tmp_path: Path) -> None:
+    given = [*ONE_CELL, *WALL, *COARSE, "-o", tmp_path / "a.step"]
+    printed = in_process(capsys, "build", *given, "--instances", "--print-config").out
+    assert "instances = true" in printed
+    assert "instances" not in in_process(capsys, "build", *given, "--print-config").out
+    (tmp_path / "lattice.toml").write_text(printed)
+    assert json.loads(in_process(capsys, "build", tmp_path / "lattice.toml", "--json").out)["instances"] == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -200,6 +222,8 @@ def test_files_of_triangles_alone_are_reported_as_triangles(capsys: Captured, tm
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--angle", "90"], ["--angle = 90.0"]),
         (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl, .3mf"]),
         (["build", "-o", "a.step", "-o", "./a.step", *ONE_CELL, *WALL], ["-o = ", "each file once"]),
+        (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--instances"], ["-o = 'a.stl'", ".step or .stp"]),
+        (["build", "-o", "a.step", *ONE_CELL, *WALL, "--trim", "box", "--instances"], ["--instances", "not trimmed"]),
         (["build", "-o", "missing/a.step", *ONE_CELL, *WALL], ["-o = 'missing/a.step'", "existing folder"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--colour", "red"], ["--colour"]),
         (["built"], ["built"]),

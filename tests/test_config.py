@@ -91,3 +91,17 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     (tmp_path / "large.toml").write_bytes(b"#" * 1_000_001)
     with pytest.raises(ParameterError, match="at most"):
         read_config(str(tmp_path / "large.toml"), KNOWN)
+
+
+def test_a_flag_is_true_or_false_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "lattice.toml"
+    path.write_text("instances = true\n")
+    assert read_config(str(path), ["instances"], ["instances"]) == {"instances": "True"}
+    for value in ("1", '"true"', "[true]"):
+        path.write_text(f"instances = {value}\n")
+        with pytest.raises(ParameterError, match=r"instances = .*: expected true or false"):
+            read_config(str(path), ["instances"], ["instances"])
+
+
+def test_flags_are_printed_only_where_they_are_set() -> None:
+    assert printed_config({"instances": True, "full": False}) == "instances = true\n"

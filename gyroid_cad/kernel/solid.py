@@ -13,7 +13,8 @@ from typing import TypeAlias
 import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.gp import gp_Pnt
-from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
     TopoDS,
@@ -32,7 +33,15 @@ from gyroid_cad.kernel.surfaces import kernel_curve
 from gyroid_cad.nurbs import NurbsCurve
 from gyroid_cad.wall import SIDES, Wall
 
-__all__ = ["TOLERANCE", "KernelShape", "another_handle", "realise", "realise_faces", "realise_patches"]
+__all__ = [
+    "TOLERANCE",
+    "KernelShape",
+    "another_handle",
+    "faces_by_patch",
+    "realise",
+    "realise_faces",
+    "realise_patches",
+]
 
 KernelShape: TypeAlias = TopoDS_Shape
 
@@ -75,6 +84,26 @@ def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
 def realise_patches(wall: Wall) -> list[list[TopoDS_Face]]:
     """All faces of every patch of a closed wall, its free side walls too, oriented outwards and sharing their edges."""
     return _Realisation(wall).patches()
+
+
+def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
+    """The faces of a solid made by :func:`realise`, by patch: side 0, side 1, then its free side walls.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+    wall : Wall
+        That it was made of; of one piece.
+    """
+    # A shell keeps the order in which it was given its faces.
+    explorer = TopExp_Explorer(solid, TopAbs_FACE)
+    faces: list[TopoDS_Face] = []
+    while explorer.More():
+        faces.append(TopoDS.Face_s(explorer.Current()))
+        explorer.Next()
+    counts = len(SIDES) + wall.complex.free[wall.complex.patch_edges].sum(axis=1)
+    ends = np.cumsum(counts).tolist()
+    return [faces[start:end] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
 
 
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:

@@ -13,6 +13,7 @@ from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.Message import Message, Message_Gravity
 from OCP.StepBasic import StepBasic_Product
+from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
@@ -23,7 +24,7 @@ from gyroid_cad.formats import require_schema
 from gyroid_cad.kernel.step_text import compact_step
 from gyroid_cad.version import __version__
 
-__all__ = ["read_step", "write_step"]
+__all__ = ["fill_header", "no_messages", "product_name", "read_step", "step_of_kernel", "write_step"]
 
 
 def write_step(
@@ -53,31 +54,61 @@ def write_step(
     ------
     ParameterError, ExportError
     """
-    kernel_schema = require_schema(schema)
-    wanted = Path(path).stem if name is None else name
-    # The writer puts other characters in unescaped, which ISO 10303-21 does not allow.
-    product = "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
-    settings: dict[str, str | int] = {
-        "write.step.schema": kernel_schema,
-        "write.step.unit": "MM",
-        "write.step.product.name": product,
-        "write.surfacecurve.mode": int(parameter_curves),
-    }
-    # The first writer of a process registers the settings; the schema counts when a model is made.
-    STEPControl_Writer()
-    with replacing(path) as temporary, _kernel_settings(settings), _silenced_messages():
+    product = product_name(path, name)
+    with step_of_kernel(path, schema, product, parameter_curves) as raw:
         writer = STEPControl_Writer()
         if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
             raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
-        _fill_header(writer, product)
+        fill_header(writer, product)
         _name_product(writer, product)
+        if writer.Write(str(raw)) != IFSelect_RetDone:
+            raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+
+
+@contextmanager
+def step_of_kernel(
+    path: str | os.PathLike[str], schema: str, product: str, parameter_curves: bool = False
+) -> Iterator[Path]:
+    """Give a name for what the kernel's writer writes; what is there at the end is made compact and moved into place.
+
+    The kernel's settings are global to the process, and count when a writer makes its model: they hold inside.
+
+    Parameters
+    ----------
+    path : path-like
+    schema : {"ap214", "ap242"}
+    product : str
+        Name of a product that is given none.
+    parameter_curves : bool
+        As of :func:`write_step`.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    settings: dict[str, str | int] = {
+        "write.step.schema": require_schema(schema),
+        "write.step.unit": "MM",
+        "write.step.product.name": product,
+        "write.surfacecurve.mode": int(parameter_curves),
+        # Of an assembly: the names of the faces of its parts.
+        "write.stepcaf.subshapes.name": 1,
+    }
+    # The first writer of a process registers the settings; the schema counts when a model is made.
+    STEPCAFControl_Writer()
+    with replacing(path) as temporary, _kernel_settings(settings), _silenced_messages():
         raw = temporary.with_name(f"{temporary.name}.raw")
         try:
-            if writer.Write(str(raw)) != IFSelect_RetDone:
-                raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+            yield raw
             compact_step(raw, temporary)
         finally:
             raw.unlink(missing_ok=True)
+
+
+def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
+    """The name, or the file's stem, in characters that ISO 10303-21 takes as they are: the kernel escapes none."""
+    wanted = Path(path).stem if name is None else name
+    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
 
 
 def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
@@ -88,7 +119,7 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     ExportError
         If the file is missing, not STEP, or holds no shape.
     """
-    with _no_messages():
+    with no_messages():
         reader = STEPControl_Reader()
         if reader.ReadFile(str(path)) != IFSelect_RetDone:
             raise ExportError(f"{path} could not be read as STEP")
@@ -99,7 +130,8 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     return shape
 
 
-def _fill_header(writer: STEPControl_Writer, product: str) -> None:
+def fill_header(writer: STEPControl_Writer, product: str) -> None:
+    """Say what the file is, by whom and, if ``SOURCE_DATE_EPOCH`` is set, of that moment."""
     header = APIHeaderSection_MakeHeader(writer.Model())
     text = TCollection_HAsciiString
     header.SetName(text(product))
@@ -161,7 +193,7 @@ def _silenced_messages() -> Iterator[None]:
 
 
 @contextmanager
-def _no_messages() -> Iterator[None]:
+def no_messages() -> Iterator[None]:
     """Keep all that the kernel says to itself: what is wrong with a file is ours to tell."""
     messenger = Message.DefaultMessenger_s()
     printers = list(messenger.Printers())

@@ -9,7 +9,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
+from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Trsf, gp_Vec
@@ -26,7 +28,7 @@ from gyroid_cad.files import replacing
 from gyroid_cad.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.kernel.solid import TOLERANCE
 
-__all__ = ["meshed", "write_stl"]
+__all__ = ["diagonal", "meshed", "write_stl"]
 
 # How far triangles that touch without belonging together are parted: a thousandth of the deviation, but
 # enough for the single-precision numbers of STL to tell them apart.
@@ -95,6 +97,13 @@ def meshed(
     # What single precision makes of slivers bounds nothing.
     slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
     return vertices, triangles[~slivers]
+
+
+def diagonal(shape: TopoDS_Shape) -> float:
+    """Of the box round a shape, a little larger than need be, in mm."""
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box, False)
+    return float(box.CornerMin().Distance(box.CornerMax()))
 
 
 def _meshed_copy(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float) -> TopoDS_Shape:

@@ -1,0 +1,148 @@
+"""One solid in many places as a STEP assembly, with names and colours, through the kernel's document (XCAF)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from OCP.gp import gp_Trsf, gp_Vec
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.Quantity import (
+    Quantity_Color,
+    Quantity_NameOfColor,
+    Quantity_NOC_GREEN,
+    Quantity_NOC_RED,
+    Quantity_NOC_YELLOW,
+)
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPControl import STEPControl_AsIs
+from OCP.StepData import StepData_StepModel
+from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
+from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+from OCP.XCAFApp import XCAFApp_Application
+from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
+
+from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.step import fill_header, product_name, step_of_kernel
+
+__all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "write_assembly"]
+
+# Of those that STEP knows by name (draughting_pre_defined_colour), so that no reader rounds them.
+YELLOW, RED, GREEN = Quantity_NOC_YELLOW, Quantity_NOC_RED, Quantity_NOC_GREEN
+
+# Of the document's unit of length, in metres: lengths are in mm.
+_MILLIMETRE = 1e-3
+_BINARY_DOCUMENT = "BinXCAF"
+
+Place = tuple[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFace:
+    """A face of a part, with its name and colour."""
+
+    face: TopoDS_Face
+    name: str
+    colour: Quantity_NameOfColor
+
+
+@dataclass(frozen=True, slots=True)
+class NamedPart:
+    """What an assembly has many of.
+
+    Attributes
+    ----------
+    shape : TopoDS_Shape
+    name : str
+    colour : Quantity_NameOfColor
+        Of the whole.
+    faces : list of NamedFace
+    """
+
+    shape: TopoDS_Shape
+    name: str
+    colour: Quantity_NameOfColor
+    faces: list[NamedFace]
+
+
+def write_assembly(
+    part: NamedPart,
+    places: Iterable[Place],
+    path: str | os.PathLike[str],
+    schema: str = "ap214",
+    name: str | None = None,
+) -> None:
+    """Write a part once, and where it is to be found, in millimetres.
+
+    Parameters
+    ----------
+    part : NamedPart
+    places : iterable of (str, tuple of float)
+        Name and translation in mm of each of its occurrences.
+    path : path-like
+        Written under a temporary name and moved into place.
+    schema : {"ap214", "ap242"}
+    name : str, optional
+        Of the assembly; the file's stem if left out.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    product = product_name(path, name)
+    with step_of_kernel(path, schema, product) as raw:
+        document = new_document()
+        _fill(document, part, places, product)
+        writer = STEPCAFControl_Writer()
+        if not writer.Transfer(document, STEPControl_AsIs):
+            raise ExportError(f"{path} was not written: the kernel could not translate the assembly to STEP")
+        fill_header(writer.ChangeWriter(), product)
+        _number_occurrences(writer.ChangeWriter().Model())
+        if writer.Write(str(raw)) != IFSelect_RetDone:
+            raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+
+
+def new_document() -> TDocStd_Document:
+    """An empty document of the kernel's, with lengths in mm."""
+    document = TDocStd_Document(TCollection_ExtendedString(_BINARY_DOCUMENT))
+    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, _MILLIMETRE)
+    return document
+
+
+def _fill(document: TDocStd_Document, part: NamedPart, places: Iterable[Place], product: str) -> None:
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    cell = shapes.AddShape(part.shape, False)
+    _name(cell, part.name)
+    colours.SetColor(cell, Quantity_Color(part.colour), XCAFDoc_ColorGen)
+    for named in part.faces:
+        face = shapes.AddSubShape(cell, named.face)
+        _name(face, named.name)
+        if named.colour != part.colour:
+            colours.SetColor(face, Quantity_Color(named.colour), XCAFDoc_ColorSurf)
+    assembly = shapes.NewShape()
+    _name(assembly, product)
+    for name, translation in places:
+        transformation = gp_Trsf()
+        transformation.SetTranslation(gp_Vec(*translation))
+        _name(shapes.AddComponent(assembly, cell, TopLoc_Location(transformation)), name)
+    shapes.UpdateAssemblies()
+
+
+def _number_occurrences(model: StepData_StepModel) -> None:
+    """Count from 1 in every file: the kernel counts on through the process, which would make each file another."""
+    entities = (model.Value(number) for number in range(1, model.NbEntities() + 1))
+    occurrences = (entity for entity in entities if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence))
+    for number, occurrence in enumerate(occurrences, 1):
+        occurrence.SetId(TCollection_HAsciiString(str(number)))
+
+
+def _name(label: TDF_Label, name: str) -> None:
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))

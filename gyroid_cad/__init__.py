@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from gyroid_cad.mesh.volumes import VolumePatches
     from gyroid_cad.meshing import mesh_quality
     from gyroid_cad.nurbs import NurbsSurface
+    from gyroid_cad.print_check import PrintCheck, print_check
+    from gyroid_cad.printers import Printer
     from gyroid_cad.triangles import TriangleReport
 
 __all__ = [
@@ -56,6 +58,8 @@ __all__ = [
     "Mesh",
     "NurbsSurface",
     "ParameterError",
+    "PrintCheck",
+    "Printer",
     "SoundnessError",
     "SpaceMap",
     "Sphere",
@@ -73,6 +77,7 @@ __all__ = [
     "fit_report",
     "linear",
     "mesh_quality",
+    "print_check",
     "radial",
     "sampled",
     "smooth_maximum",
@@ -109,6 +114,8 @@ _HOMES = {
     "mesh.volumes": ("VolumePatches",),
     "meshing": ("mesh_quality",),
     "nurbs": ("NurbsSurface",),
+    "print_check": ("PrintCheck", "print_check"),
+    "printers": ("Printer",),
     "triangles": ("TriangleReport",),
 }
 

@@ -12,7 +12,7 @@ from gyroid_cad.errors import ParameterError
 if TYPE_CHECKING:
     from gyroid_cad.lattice import Lattice
 
-__all__ = ["lattice_of", "lattice_options", "option_name", "printed_options"]
+__all__ = ["lattice_of", "lattice_options", "lattice_options_beside", "option_name", "printed_options"]
 
 _CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
@@ -43,13 +43,6 @@ def printed_options() -> str:
 
 
 _OPTIONS = (
-    click.argument(
-        "config",
-        required=False,
-        metavar="[LATTICE.toml]",
-        is_eager=True,
-        callback=_defaults_from_file,
-    ),
     click.option(
         "--surface",
         type=click.Choice(["gyroid", "diamond", "primitive"]),
@@ -116,9 +109,21 @@ _OPTIONS = (
 
 def lattice_options(function: Callable[..., None]) -> Callable[..., None]:
     """Give a command the argument and the options that :func:`lattice_of` reads."""
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
+    return lattice_options_beside("LATTICE.toml")(function)
+
+
+def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The same, where the argument may be other files as well: those that this text shows."""
+
+    def given_to(function: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(_OPTIONS):
+            function = option(function)
+        argument = click.argument(
+            "config", required=False, metavar=f"[{files}]", is_eager=True, callback=_defaults_from_file
+        )
+        return argument(function)
+
+    return given_to
 
 
 def lattice_of(given: dict[str, Any]) -> Lattice:

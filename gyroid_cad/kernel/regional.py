@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -85,11 +86,12 @@ _inherited: list[Task] = []
 
 def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
     """What is found in each region."""
+    before = multiprocessing.active_children()
     executor = ProcessPoolExecutor(
         min(processes, len(task.regions)),
         multiprocessing.get_context("fork"),
         # Not sent: a forked process has it already.
-        initializer=_inherited.append,
+        initializer=_begin,
         initargs=(task,),
     )
     done = 0
@@ -101,10 +103,22 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
             if progress is not None:
                 progress(done, len(task.faces))
         return [future.result() for future in futures]
+    except KeyboardInterrupt:
+        # Nobody waits for what the kernel is at.
+        for process in multiprocessing.active_children():
+            if process not in before:
+                process.terminate()
+        raise
     except BrokenProcessPool as broken:
         raise KernelError("a process that split the part against the lattice ended too soon") from broken
     finally:
         executor.shutdown(cancel_futures=True)
+
+
+def _begin(task: Task) -> None:
+    """Make a process ready; a terminal interrupts all of a program's processes, and only the first has an answer."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _inherited.append(task)
 
 
 def _found(number: int) -> Found:

@@ -101,7 +101,7 @@ def fill_command(
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         faces = [_face(opening) for opening in openings]
         filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
-        filled.write(*output, schema=schema, deviation=deviation, angle=angle)
+        filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = [{"path": path, "bytes": Path(path).stat().st_size} for path in output]

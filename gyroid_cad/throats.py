@@ -38,8 +38,8 @@ _NODES = 16
 _EXACT_SAMPLES, _FACE_SAMPLES = 25, 9
 # Nodes whose distances agree so closely, in cell sizes, lie equally far: symmetric ones do, to rounding.
 _EQUALLY_FAR = 1e-9
-# The nearest place is sought in ever smaller grids round the best one: the last has steps of about 1e-8.
-_CLOSER_SAMPLES, _CLOSER_ROUNDS = 17, 9
+# The nearest place is sought in ever smaller grids round the best one, down to a reach whose square is rounding.
+_CLOSER_SAMPLES, _CLOSEST, _NO_NEARER = 17, 1e-8, 1e-14
 # Distances to samples that may yet turn out the least, as a part of the least; and how many are looked at closely.
 _MAY_BE_LEAST, _LOOKED_AT = 1.05, 64
 _PATCHES_AT_ONCE = 4_000
@@ -108,13 +108,12 @@ def labyrinth_throats(surface: MinimalSurface) -> Throats:
         held = _held(np.where(above == side, distance, 0.0).reshape(3 * [_NODES]))
         at = np.flatnonzero((above == side) & (np.abs(distance - held) < _EQUALLY_FAR))
         chosen.append(at)
-        patch, sample = divmod(int(nearest[at[0]]), _EXACT_SAMPLES**2)
+        patch = int(nearest[at[0]]) // _EXACT_SAMPLES**2
         turn = complex.placements.matrices[complex.patch_placement[patch]]
         middle = complex.placements.translations[complex.patch_placement[patch]] / CELL_QUARTERS
         # In the patch's own frame, whose unit is half a cell.
         own = 2 * (nodes[at[0]] - middle - complex.patch_cell[patch]) @ turn
-        start = samples[sample // _EXACT_SAMPLES], samples[sample % _EXACT_SAMPLES]
-        radii.append(_least_distance(exact, own, start, samples) / 2)
+        radii.append(_least_distance(exact, own) / 2)
     every = np.concatenate(chosen)
     return Throats(nodes[every], above[every], min(radii))
 
@@ -137,21 +136,23 @@ def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int])
     """
     centres = _throats_of_block(labyrinth_throats(grading.surface).centres, cells) * grading.cell_size
     images = grading.carry(centres)[0].T
-    samples = np.linspace(-1, 1, _FACE_SAMPLES)
-    distance, face, sample = _to_faces(wall, images, samples)
+    distance, patch = _to_faces(wall, images)
     least = float(distance.min())
     near = np.argsort(distance)[:_LOOKED_AT]
     for throat in near[distance[near] <= _MAY_BE_LEAST * least].tolist():
-        patch, side = divmod(int(face[throat]), 2)
-        net, knots = wall.nets[wall.patch_net[patch], side], (wall.knots, wall.knots)
-        start = samples[sample[throat] // _FACE_SAMPLES], samples[sample[throat] % _FACE_SAMPLES]
-        point = images[throat] - wall.shifts[wall.patch_shift[patch]]
-
-        def face_at(u: Floats, v: Floats, net: Floats = net, knots: tuple[Floats, Floats] = knots) -> Floats:
-            return grid_points(net, wall.weights, knots, u, v)
-
-        least = min(least, _least_distance(face_at, point, start, samples))
+        # The nearest place may lie just across an edge of the patch with the nearest sample.
+        beside = wall.complex.edge_patches[wall.complex.patch_edges[patch[throat]]]
+        for other in np.unique(beside[beside >= 0]).tolist():
+            point = images[throat] - wall.shifts[wall.patch_shift[other]]
+            least = min(least, *(_from_face(wall, int(wall.patch_net[other]), side, point) for side in SIDES))
     return 2 * least
+
+
+def _from_face(wall: Wall, net: int, side: int, point: Floats) -> float:
+    def places(u: Floats, v: Floats) -> Floats:
+        return grid_points(wall.nets[net, side], wall.weights, (wall.knots, wall.knots), u, v)
+
+    return _least_distance(places, point)
 
 
 def _throats_of_block(centres: Floats, cells: tuple[int, int, int]) -> Floats:
@@ -161,38 +162,37 @@ def _throats_of_block(centres: Floats, cells: tuple[int, int, int]) -> Floats:
     return np.asarray(every[np.all(every <= np.array(cells), axis=1)])
 
 
-def _to_faces(wall: Wall, points: Floats, samples: Floats) -> tuple[Floats, Integers, Integers]:
-    """Distances of points from samples of all faces, and the nearest ones: twice the patch and the side, and which."""
+def _to_faces(wall: Wall, points: Floats) -> tuple[Floats, Integers]:
+    """Distances of points from samples of all faces, and to which patches the nearest ones belong."""
     from scipy.spatial import cKDTree
 
-    distance = np.full(len(points), np.inf)
-    face, sample = np.zeros(len(points), dtype=np.int64), np.zeros(len(points), dtype=np.int64)
-    knots = (wall.knots, wall.knots)
+    samples, knots = np.linspace(-1, 1, _FACE_SAMPLES), (wall.knots, wall.knots)
+    distance, patch = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
     for first in range(0, wall.complex.patch_count, _PATCHES_AT_ONCE):
         some = slice(first, first + _PATCHES_AT_ONCE)
         places = grid_points(wall.nets[wall.patch_net[some]], wall.weights, knots, samples, samples)
-        places = places.reshape(len(places), len(SIDES), -1, 3)
-        places = places + wall.shifts[wall.patch_shift[some]][:, np.newaxis, np.newaxis]
+        places = places.reshape(len(places), -1, 3) + wall.shifts[wall.patch_shift[some]][:, np.newaxis]
         found = cKDTree(places.reshape(-1, 3)).query(points)
         nearer = np.asarray(found[0]) < distance
         distance[nearer] = np.asarray(found[0])[nearer]
-        which, sample[nearer] = np.divmod(np.asarray(found[1], dtype=np.int64)[nearer], len(samples) ** 2)
-        face[nearer] = which + len(SIDES) * first
-    return distance, face, sample
+        patch[nearer] = first + np.asarray(found[1])[nearer] // places.shape[1]
+    return distance, patch
 
 
-def _least_distance(
-    places: Callable[[Floats, Floats], Floats], point: Floats, start: tuple[float, float], samples: Floats
-) -> float:
-    """Distance of a point from a surface on [-1, 1]^2, near a place on it."""
-    (u, v), reach, least = start, float(samples[1] - samples[0]), np.inf
-    for _ in range(_CLOSER_ROUNDS):
-        along = np.linspace(-1, 1, _CLOSER_SAMPLES) * reach
+def _least_distance(places: Callable[[Floats, Floats], Floats], point: Floats) -> float:
+    """Distance of a point from a surface on [-1, 1]^2, by ever smaller grids round the nearest place."""
+    u = v = 0.0
+    reach, least = 1.0, np.inf
+    while reach > _CLOSEST:
+        along = np.linspace(-reach, reach, _CLOSER_SAMPLES)
         us, vs = np.clip(u + along, -1, 1), np.clip(v + along, -1, 1)
         distance = np.linalg.norm(places(us, vs) - point, axis=-1)
         i, j = np.unravel_index(int(np.argmin(distance)), distance.shape)
-        u, v, least = float(us[i]), float(vs[j]), float(distance[i, j])
-        reach *= 3 / _CLOSER_SAMPLES
+        nearer = float(distance[i, j]) < least * (1 - _NO_NEARER)
+        u, v, least = float(us[i]), float(vs[j]), min(least, float(distance[i, j]))
+        # At the grid's rim there may be nearer places beyond.
+        at_rim = not {0, _CLOSER_SAMPLES - 1}.isdisjoint((i, j))
+        reach *= 1.0 if at_rim and nearer and reach < 1 else 3 / _CLOSER_SAMPLES
     return least
 
 

@@ -33,7 +33,7 @@ class Shells:
     triangles : ndarray of int, shape (shells,)
         How many each has.
     inside : ndarray of bool, shape (shells,)
-        Whether another shell goes round it.
+        Of shells turned inwards: whether another goes round it.
     open_edges : int
         Not run through as often one way as the other: at these the surface is not closed, or turned inside out.
     low, high : ndarray, shape (3,)
@@ -89,7 +89,10 @@ def shells_of(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) ->
     corners = points[facets] - points.mean(axis=0)
     volumes = np.bincount(labels, np.einsum("nc,nc->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
     order = np.argsort(-np.abs(volumes), kind="stable")
-    inside = np.array([_inside_another(points, facets, labels, shell) for shell in order.tolist()], dtype=np.bool_)
+    # There may be thousands of loose pieces, and each question takes all triangles: only voids are asked.
+    inside = np.zeros(len(order), dtype=np.bool_)
+    for place in np.flatnonzero(volumes[order] < 0).tolist():
+        inside[place] = _inside_another(points, facets, labels, int(order[place]))
     used = points[np.unique(facets)]
     counts = np.bincount(labels)[order]
     return Shells(

@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 
 # A ray starts so far inside, as a part of the solid's size: beyond rounding, and far below any wall.
 _STARTS_INSIDE = 1e-6
+# How near a line must pass a triangle to meet it, as a part of the solid's size: with none VTK misses some.
+_MEETS = 1e-9
 # A wall has two sides that face away from each other, within 45 degrees; tips and edges, which run out to nothing, have
 # not.
 _FACING_AWAY = -np.sqrt(0.5)
@@ -56,7 +58,7 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
     found = []
     for start, direction in zip(starts, inward, strict=True):
         part, place, local, sub, cell = core.mutable(0.0), [0.0] * 3, [0.0] * 3, core.mutable(0), core.mutable(-1)
-        met = locator.IntersectWithLine(start, start + size * direction, 0.0, part, place, local, sub, cell)
+        met = locator.IntersectWithLine(start, start + size * direction, _MEETS * size, part, place, local, sub, cell)
         if met and -direction @ normals[int(cell)] < _FACING_AWAY:
             found.append(float(part) * size)
     return np.sort(np.array(found)) + _STARTS_INSIDE * size

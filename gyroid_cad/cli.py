@@ -192,18 +192,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _fail(problem.format_message(), BAD_USAGE)
     except ParameterError as problem:
         status = _fail(_with_option_name(problem), BAD_USAGE)
-    except GyroidError as problem:
-        status = _fail(str(problem), FAILED)
     except (click.Abort, KeyboardInterrupt):
         status = _fail("interrupted", INTERRUPTED)
-    except Exception as problem:  # a defect of ours is still one line for the user
-        status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
+    except Exception as problem:
+        if _was_interrupted(problem):
+            status = _fail("interrupted", INTERRUPTED)
+        elif isinstance(problem, GyroidError):
+            status = _fail(str(problem), FAILED)
+        else:  # a defect of ours is still one line for the user
+            status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
     return status
 
 
 def _fail(message: str, status: int) -> int:
     click.echo(f"{PROGRAM}: error: {' '.join(message.split())}", err=True)
     return status
+
+
+def _was_interrupted(problem: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error: one that comes while the kernel is loaded ends as an ImportError."""
+    while problem is not None:
+        if isinstance(problem, KeyboardInterrupt):
+            return True
+        problem = problem.__cause__ or problem.__context__
+    return False
 
 
 def _with_option_name(problem: ParameterError) -> str:

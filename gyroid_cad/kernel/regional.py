@@ -12,6 +12,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -96,7 +97,8 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
     )
     done = 0
     try:
-        futures = {executor.submit(_found, number): region for number, region in enumerate(task.regions)}
+        with _interrupts_later():
+            futures = {executor.submit(_found, number): region for number, region in enumerate(task.regions)}
         for future in as_completed(futures):
             future.result()
             done += len(futures[future])
@@ -113,6 +115,22 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
         raise KernelError("a process that split the part against the lattice ended too soon") from broken
     finally:
         executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Hold interrupts back until the context ends: what comes while a process is forked, Python reports and forgets."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    if heard:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _begin(task: Task) -> None:

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from gyroid_cad.mesh.volumes import VolumePatches
     from gyroid_cad.meshing import mesh_quality
     from gyroid_cad.nurbs import NurbsSurface
-    from gyroid_cad.print_check import PrintCheck, print_check
     from gyroid_cad.printers import Printer
+    from gyroid_cad.printing import PrintCheck, print_check
     from gyroid_cad.triangles import TriangleReport
 
 __all__ = [
@@ -114,7 +114,7 @@ _HOMES = {
     "mesh.volumes": ("VolumePatches",),
     "meshing": ("mesh_quality",),
     "nurbs": ("NurbsSurface",),
-    "print_check": ("PrintCheck", "print_check"),
+    "printing": ("PrintCheck", "print_check"),
     "printers": ("Printer",),
     "triangles": ("TriangleReport",),
 }

@@ -98,8 +98,8 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
         return
     outputs, printer = given["output"], given["printer"]
     if printer is not None:
-        from gyroid_cad.print_check import print_check
         from gyroid_cad.printers import printer_named
+        from gyroid_cad.printing import print_check
 
         printer = printer_named(printer)
     settings = {name: given[name] for name in ("schema", "deviation", "angle")}

@@ -47,8 +47,8 @@ def print_check_command(
     gyroid-cad print-check --cells 4 4 4 --cell-size 12 --thickness 0.8
     """
     start = time.perf_counter()
-    from gyroid_cad.print_check import print_check
     from gyroid_cad.printers import printer_named
+    from gyroid_cad.printing import print_check
 
     chosen, file = printer_named(printer), given["config"]
     part: Any = file

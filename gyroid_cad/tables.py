@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gyroid_cad.doctor import Diagnosis
-    from gyroid_cad.print_check import PrintCheck
+    from gyroid_cad.printing import PrintCheck
 
 __all__ = [
     "print_check_table",

@@ -12,7 +12,7 @@ import trimesh
 from gyroid_cad.cli import main
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.print_check import print_check
+from gyroid_cad.printing import print_check
 
 Captured = pytest.CaptureFixture[str]
 

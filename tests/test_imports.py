@@ -78,7 +78,7 @@ ROWS = [
     ["infill"],
     ["filled_part"],
     ["filling"],
-    ["print_check", "doctor"],
+    ["printing", "doctor"],
     ["__init__"],
     ["cq_plugin", "bd_objects", "progress", "config"],
     ["tables"],
@@ -190,3 +190,7 @@ def test_a_public_name_is_the_one_of_its_home_module(name: str) -> None:
     value = getattr(gyroid_cad, name)
     assert value is getattr(sys.modules[value.__module__], name)
     assert value.__module__.startswith("gyroid_cad.")
+
+
+def test_no_public_name_is_a_modules_too_which_would_take_its_place_when_it_is_loaded() -> None:
+    assert not set(gyroid_cad.__all__) & set(MODULES)

@@ -17,8 +17,8 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.families import SURFACES
 from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.print_check import PrintCheck, print_check, trapped_voids
 from gyroid_cad.printers import printer_named
+from gyroid_cad.printing import PrintCheck, print_check, trapped_voids
 from gyroid_cad.throats import throat_diameter
 
 FORM2 = printer_named("form2")

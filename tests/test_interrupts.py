@@ -78,18 +78,16 @@ def test_while_a_large_file_is_written_nothing_of_it_is_left(tmp_path: Path, nam
     only_the_older_file(tmp_path, name)
 
 
-@pytest.mark.parametrize("ending", ["step", "brep"])
-def test_while_the_kernel_writes_its_file_goes_too(tmp_path: Path, ending: str) -> None:
+def test_while_the_kernel_writes_step_both_its_temporary_files_go(tmp_path: Path) -> None:
     # It hears of the interrupt when its writer returns.
-    name = f"a.{ending}"
-    (tmp_path / name).write_text("older")
-    run = started(tmp_path, "build", "-o", name, "--cells", "3", "3", "3", *LARGE[4:])
+    (tmp_path / "a.step").write_text("older")
+    run = started(tmp_path, "build", "-o", "a.step", "--cells", "3", "3", "2", *LARGE[4:])
     wait_for_partial(run, tmp_path)
     interrupted(run)
-    only_the_older_file(tmp_path, name)
+    only_the_older_file(tmp_path, "a.step")
 
 
-@pytest.mark.parametrize("seconds", [0.3, 0.9, 1.5])
+@pytest.mark.parametrize("seconds", [0.3, 1.2])
 def test_while_it_loads_or_builds_no_file_has_begun(tmp_path: Path, seconds: float) -> None:
     (tmp_path / "a.step").write_text("older")
     run = started(tmp_path, "build", "-o", "a.step", *LARGE)

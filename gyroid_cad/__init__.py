@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from gyroid_cad.mesh.volumes import VolumePatches
     from gyroid_cad.meshing import mesh_quality
     from gyroid_cad.nurbs import NurbsSurface
+    from gyroid_cad.printers import Printer
+    from gyroid_cad.printing import PrintCheck, print_check
     from gyroid_cad.triangles import TriangleReport
 
 __all__ = [
@@ -59,6 +61,8 @@ __all__ = [
     "Mesh",
     "NurbsSurface",
     "ParameterError",
+    "PrintCheck",
+    "Printer",
     "SoundnessError",
     "SpaceMap",
     "Sphere",
@@ -76,6 +80,7 @@ __all__ = [
     "fit_report",
     "linear",
     "mesh_quality",
+    "print_check",
     "radial",
     "sampled",
     "smooth_maximum",
@@ -113,6 +118,8 @@ _HOMES = {
     "mesh.volumes": ("VolumePatches",),
     "meshing": ("mesh_quality",),
     "nurbs": ("NurbsSurface",),
+    "printing": ("PrintCheck", "print_check"),
+    "printers": ("Printer",),
     "triangles": ("TriangleReport",),
 }
 

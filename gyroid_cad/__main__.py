@@ -2,11 +2,14 @@
 
 import sys
 
-from gyroid_cad.cli import main
-
 
 def run() -> None:
     """Run the command line and leave with its status."""
+    try:
+        from gyroid_cad.cli import main
+    except KeyboardInterrupt:  # while what the commands need is loaded
+        print("gyroid-cad: error: interrupted", file=sys.stderr)
+        sys.exit(130)
     sys.exit(main())
 
 

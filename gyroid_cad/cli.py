@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gyroid_cad.cli_completion import answered_shell, completion_command
+from gyroid_cad.cli_doctor import doctor_command, version_option
 from gyroid_cad.cli_fill import fill_command
 from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name, printed_options
 from gyroid_cad.cli_mesh import mesh_command, volumes_command
+from gyroid_cad.cli_print import print_check_command
 from gyroid_cad.cli_view import view_command
 from gyroid_cad.errors import GyroidError, ParameterError
-from gyroid_cad.tables import print_built, print_table, shown_progress
-from gyroid_cad.version import __version__
+from gyroid_cad.tables import print_built, print_check_table, print_table, shown_progress
 
 if TYPE_CHECKING:
     from gyroid_cad.assembly import AssemblyReport
@@ -27,13 +29,20 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 PROGRAM = "gyroid-cad"
+# Those that are no options.
+_ARGUMENTS = ("config", "file", "part")
 DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name=PROGRAM)
+@version_option
 def commands() -> None:
-    """The gyroid as exact-grade CAD solids. Lengths are in millimetres, angles in degrees."""
+    """The gyroid as exact-grade CAD solids. Lengths are in millimetres, angles in degrees.
+
+    \b
+    gyroid-cad build -o part.step --cells 2 2 2 --cell-size 10 --thickness 0.8
+    gyroid-cad doctor
+    """
 
 
 @commands.command()
@@ -68,6 +77,7 @@ def commands() -> None:
     metavar="DEGREES",
     help="Between triangles of a lattice cut with --trim; those of whole patches keep to the deviation alone.",
 )
+@click.option("--printer", metavar="NAME|FILE.toml", help="Check as well whether it can make this, such as form2.")
 @click.option("--print-config", is_flag=True, help="Print the lattice as TOML, ready for LATTICE.toml; build nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 @click.option("--quiet", is_flag=True, help="Print no table and no progress.")
@@ -85,6 +95,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     gyroid-cad build -o part.step --cells 3 3 1 --cell-size 10 --thickness "0.6 + 0.04*x"
     gyroid-cad build -o block.step --cells 5 5 5 --cell-size 7 --density 0.3 --trim box
     gyroid-cad build -o ring.step --cells 12 2 1 --cell-size 10 --density 0.2 --map cylinder:radius=20,angle=360
+    gyroid-cad build -o print.stl --cells 4 4 4 --cell-size 12 --thickness 0.8 --printer form2
     gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
     """
     start = time.perf_counter()
@@ -94,7 +105,12 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     if print_config:
         click.echo(printed_options(), nl=False)
         return
-    outputs = given["output"]
+    outputs, printer = given["output"], given["printer"]
+    if printer is not None:
+        from gyroid_cad.printers import printer_named
+        from gyroid_cad.printing import print_check
+
+        printer = printer_named(printer)
     settings = {name: given[name] for name in ("schema", "deviation", "angle", "instances")}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
@@ -105,17 +121,23 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
             report = lattice.report(progress)
         else:
             report = lattice.triangle_report(given["deviation"], progress)
+        check = None if printer is None else print_check(lattice, printer, given["deviation"], progress)
     summary = _summary(report, outputs, time.perf_counter() - start)
+    if check is not None:
+        summary["print_check"] = check.as_dict()
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
         print_built(summary)
+        if check is not None:
+            print_check_table(check)
 
 
-commands.add_command(fill_command)
-commands.add_command(mesh_command)
-commands.add_command(volumes_command)
-commands.add_command(view_command)
+for _command in (
+    *(fill_command, mesh_command, volumes_command, view_command, print_check_command),
+    *(doctor_command, completion_command),
+):
+    commands.add_command(_command)
 
 
 @commands.command("fit-report")
@@ -124,7 +146,12 @@ commands.add_command(view_command)
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def fit_report_command(control_points: int, as_json: bool) -> None:
-    """What our fit and the paper's are worth, side by side."""
+    """What our fit and the paper's are worth, side by side.
+
+    \b
+    gyroid-cad fit-report
+    gyroid-cad fit-report --control-points 14 --json
+    """
     from gyroid_cad.fit import FitSettings, fit_patch, fit_report
 
     reports = {
@@ -160,6 +187,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 failed, 2 bad usage; an error is one line on stderr.
     """
+    if (answered := answered_shell(commands, PROGRAM)) is not None:
+        return answered
     try:
         # Not commands.main: it would put an empty line before the one that says "interrupted".
         with commands.make_context(PROGRAM, list(sys.argv[1:] if arguments is None else arguments)) as context:
@@ -174,12 +203,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _fail(problem.format_message(), BAD_USAGE)
     except ParameterError as problem:
         status = _fail(_with_option_name(problem), BAD_USAGE)
-    except GyroidError as problem:
-        status = _fail(str(problem), FAILED)
     except (click.Abort, KeyboardInterrupt):
         status = _fail("interrupted", INTERRUPTED)
-    except Exception as problem:  # a defect of ours is still one line for the user
-        status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
+    except Exception as problem:
+        if _was_interrupted(problem):
+            status = _fail("interrupted", INTERRUPTED)
+        elif isinstance(problem, GyroidError):
+            status = _fail(str(problem), FAILED)
+        else:  # a defect of ours is still one line for the user
+            status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
     return status
 
 
@@ -188,8 +220,17 @@ def _fail(message: str, status: int) -> int:
     return status
 
 
+def _was_interrupted(problem: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error: one that comes while the kernel is loaded ends as an ImportError."""
+    while problem is not None:
+        if isinstance(problem, KeyboardInterrupt):
+            return True
+        problem = problem.__cause__ or problem.__context__
+    return False
+
+
 def _with_option_name(problem: ParameterError) -> str:
-    if not problem.parameter.isidentifier() or problem.parameter in ("config", "file"):
+    if not problem.parameter.isidentifier() or problem.parameter in _ARGUMENTS:
         return str(problem)
     return str(problem).replace(problem.parameter, option_name(problem.parameter), 1)
 

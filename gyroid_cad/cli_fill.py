@@ -98,7 +98,7 @@ def fill_command(
         faces = [_face(opening) for opening in openings]
         settings = {**given, **chosen_surface(surface)}
         filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **settings)
-        filled.write(*output, schema=schema, deviation=deviation, angle=angle)
+        filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = [{"path": path, "bytes": Path(path).stat().st_size} for path in output]

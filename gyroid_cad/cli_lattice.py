@@ -12,7 +12,15 @@ from gyroid_cad.errors import ParameterError
 if TYPE_CHECKING:
     from gyroid_cad.lattice import Lattice
 
-__all__ = ["chosen_surface", "lattice_of", "lattice_options", "option_name", "printed_options", "surface_option"]
+__all__ = [
+    "chosen_surface",
+    "lattice_of",
+    "lattice_options",
+    "lattice_options_beside",
+    "option_name",
+    "printed_options",
+    "surface_option",
+]
 
 _CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
@@ -46,16 +54,21 @@ def printed_options() -> str:
     return printed_config({name: context.params[name] for name in keys if name not in _NO_KEYS})
 
 
+def _known_surfaces(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """What a shell may complete the name of a surface to."""
+    from gyroid_cad.families import SURFACES
+
+    return [name for name in SURFACES if name.startswith(incomplete)]
+
+
 # Which surfaces there are is for the table of families to say; it is not read for --help alone.
-surface_option = click.option("--surface", metavar="NAME", help="gyroid, diamond or primitive; gyroid if left out.")
+surface_option = click.option(
+    "--surface",
+    metavar="NAME",
+    shell_complete=_known_surfaces,
+    help="gyroid, diamond or primitive; gyroid if left out.",
+)
 _OPTIONS = (
-    click.argument(
-        "config",
-        required=False,
-        metavar="[LATTICE.toml]",
-        is_eager=True,
-        callback=_defaults_from_file,
-    ),
     surface_option,
     click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z."),
     click.option(
@@ -116,9 +129,21 @@ _OPTIONS = (
 
 def lattice_options(function: Callable[..., None]) -> Callable[..., None]:
     """Give a command the argument and the options that :func:`lattice_of` reads."""
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
+    return lattice_options_beside("LATTICE.toml")(function)
+
+
+def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The same, where the argument may be other files as well: those that this text shows."""
+
+    def given_to(function: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(_OPTIONS):
+            function = option(function)
+        argument = click.argument(
+            "config", required=False, metavar=f"[{files}]", is_eager=True, callback=_defaults_from_file
+        )
+        return argument(function)
+
+    return given_to
 
 
 def chosen_surface(name: str | None) -> dict[str, Any]:

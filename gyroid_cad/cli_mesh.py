@@ -13,6 +13,7 @@ import click
 
 from gyroid_cad.cli_lattice import lattice_of, lattice_options
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.stages import timed
 from gyroid_cad.tables import print_mesh, print_table, print_volumes, shown_progress
 
 __all__ = ["mesh_command", "volumes_command"]
@@ -75,19 +76,23 @@ def mesh_command(
 
         require_histogram(histogram)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        made = (
-            lattice.quadrilaterals(subdivisions, order, full)
-            if layers == 0
-            else lattice.hexahedra(subdivisions, layers, order, full)
-        )
-        pairs = lattice.periodic_pairs(made) if made.layers else None
+        # The wall first, so that its progress is told.
+        lattice.laid(progress)
+        with timed({}, "elements", progress):
+            made = (
+                lattice.quadrilaterals(subdivisions, order, full)
+                if layers == 0
+                else lattice.hexahedra(subdivisions, layers, order, full)
+            )
+            pairs = lattice.periodic_pairs(made) if made.layers else None
         measured = None
         if quality or histogram:
             from gyroid_cad.meshing import mesh_quality
 
             measured = mesh_quality(made)
         for target in targets:
-            write_mesh(made, target, pairs, progress)
+            with timed({}, f"write {target.name}", progress):
+                write_mesh(made, target, pairs, progress)
         if measured is not None and histogram is not None:
             draw_quality(measured, histogram)
     files = [*output, *([histogram] if histogram else [])]
@@ -125,7 +130,7 @@ def mesh_command(
 @lattice_options
 @click.option("--degree", type=int, default=1, show_default=True, metavar="1|3", help="Across the wall; 3 along it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table.")
+@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
 def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: bool, **given: Any) -> None:
     """Write a lattice as conforming trivariate NURBS patches, for isogeometric analysis.
 
@@ -139,9 +144,13 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
 
     lattice = lattice_of(given)
     targets = _distinct(output, require_volume_file)
-    made = lattice.volumes(degree)
-    for target in targets:
-        write_volumes(made, target)
+    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
+        lattice.laid(progress)
+        with timed({}, "volumes", progress):
+            made = lattice.volumes(degree)
+        for target in targets:
+            with timed({}, f"write {target.name}", progress):
+                write_volumes(made, target)
     summary = {
         "patches": len(made),
         "degrees": list(made.degrees),

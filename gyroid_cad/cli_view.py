@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli_lattice import lattice_of, lattice_options
+from gyroid_cad.cli_lattice import lattice_of, lattice_options_beside
 from gyroid_cad.tables import shown_progress
 
 __all__ = ["view_command"]
@@ -16,7 +16,7 @@ _TOML_ENDING = ".toml"
 
 
 @click.command("view")
-@lattice_options
+@lattice_options_beside("LATTICE.toml|FILE")
 @click.option("--screenshot", metavar="FILE.png", help="Draw into a file, off screen, instead of opening a window.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
@@ -37,8 +37,3 @@ def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
     what = file if named else lattice_of(given)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         view(what, screenshot, progress)
-
-
-for _parameter in view_command.params:
-    if isinstance(_parameter, click.Argument):
-        _parameter.metavar = f"[LATTICE{_TOML_ENDING}|FILE]"

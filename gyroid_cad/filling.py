@@ -26,7 +26,7 @@ from gyroid_cad.limits import require_cell_size, sound_tolerance
 from gyroid_cad.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.picture import CAMERA, SIZE, require_view
 from gyroid_cad.regions import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
-from gyroid_cad.stages import Progress
+from gyroid_cad.stages import Progress, timed
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.part import Part
@@ -153,6 +153,7 @@ class Filled:
         schema: str = "ap214",
         deviation: float | None = None,
         angle: float = 15.0,
+        progress: Progress | None = None,
     ) -> None:
         """Write the filled part, as :meth:`gyroid_cad.Lattice.write` does a lattice.
 
@@ -168,7 +169,8 @@ class Filled:
             if not self.report.closed and FORMATS[path.suffix.lower()] in TRIANGLE_FORMATS:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
         for path in targets:
-            write_shape(self.solid(), path, schema, limit, angle, cut=True)
+            with timed(self.report.seconds, f"write {path.name}", progress):
+                write_shape(self.solid(), path, schema, limit, angle, cut=True)
 
 
 def fill(

@@ -5,11 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gyroid_cad.doctor import Diagnosis
+    from gyroid_cad.printing import PrintCheck
 
 __all__ = [
     "print_assembly",
     "print_built",
+    "print_check_table",
+    "print_doctor",
     "print_fill",
     "print_mesh",
     "print_summary",
@@ -177,6 +183,26 @@ def print_volumes(summary: dict[str, Any]) -> None:
     print_table(None, rows)
 
 
+def print_check_table(check: PrintCheck) -> None:
+    """Print what a printer makes of a part, row by row, and the verdict."""
+    scale = check.suggested_scale
+    if check.passed:
+        verdict = "can be printed"
+    elif scale is not None and scale != 1:
+        verdict = f"cannot be printed as it is; suggested scale {scale:.4g}"
+    else:
+        verdict = "cannot be printed as it is" + ("" if scale else ", at no scale: what fits has too thin a wall")
+    rows = [*check.rows(), ("verdict", verdict, "passed" if check.passed else "failed")]
+    print_table((f"{check.printer.name}, {check.printer.process}", "", ""), rows)
+
+
+def print_doctor(diagnosis: Diagnosis) -> None:
+    """Print what is installed and what the self-test found."""
+    rows = [(finding.subject, finding.state, finding.detail) for finding in diagnosis.findings]
+    verdict = "all that is required is there and works" if diagnosis.well else "something required fails"
+    print_table(None, [*rows, ("verdict", "well" if diagnosis.well else "failed", verdict)])
+
+
 def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
     """A progress display on the terminal while the context lasts, or none."""
     if not shown:
@@ -212,7 +238,7 @@ def print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]])
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(*(header or ("", "")), show_header=header is not None, box=None, pad_edge=False)
+    table = Table(*(header or [""] * len(rows[0])), show_header=header is not None, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
     # In a pipe there is no width to respect: nothing is wrapped.

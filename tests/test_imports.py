@@ -20,7 +20,7 @@ ROWS = [
     ["version"],
     ["arrays", "roots"],
     ["checks", "stages", "remembered"],
-    ["picture"],
+    ["picture", "printers"],
     ["expressions"],
     ["fields"],
     ["field_makers"],
@@ -40,7 +40,7 @@ ROWS = [
     ["wall"],
     ["exact_wall"],
     ["soundness", "refit", "covering", "rims", "quadrature", "loops"],
-    ["sections"],
+    ["sections", "throats"],
     ["trimming"],
     ["box_caps"],
     ["box_cut"],
@@ -48,13 +48,14 @@ ROWS = [
     ["formats"],
     ["mesh"],
     ["mesh.places", "mesh.elements", "mesh.corner_measures", "mesh.templates", "mesh.three_mf"],
+    ["mesh.shells", "mesh.triangle_files", "mesh.wall_thickness"],
     ["mesh.determinants", "mesh.hexahedra", "mesh.volumes", "mesh.measuring"],
     ["mesh.summaries", "mesh.periodic", "mesh.volume_files", "mesh.subdivision"],
     ["mesh.quality", "mesh.abaqus", "mesh.triangulation"],
     ["mesh.quality_picture", "mesh.mesh_files", "mesh.corners"],
     ["mesh.stl"],
     ["kernel"],
-    ["kernel.surfaces"],
+    ["kernel.surfaces", "kernel.origin"],
     ["kernel.geometry"],
     ["kernel.solid"],
     ["kernel.check"],
@@ -78,11 +79,12 @@ ROWS = [
     ["infill"],
     ["filled_part"],
     ["filling"],
+    ["printing", "doctor"],
     ["__init__"],
     ["cq_plugin", "bd_objects", "viewer", "progress", "config"],
     ["tables"],
-    ["cli_lattice"],
-    ["cli_fill", "cli_mesh", "cli_view"],
+    ["cli_lattice", "cli_doctor", "cli_completion"],
+    ["cli_fill", "cli_mesh", "cli_print", "cli_view"],
     ["cli"],
     ["__main__"],
 ]
@@ -195,3 +197,7 @@ def test_a_public_name_is_the_one_of_its_home_module(name: str) -> None:
     value = getattr(gyroid_cad, name)
     assert value is getattr(sys.modules[value.__module__], name)
     assert value.__module__.startswith("gyroid_cad.")
+
+
+def test_no_public_name_is_a_modules_too_which_would_take_its_place_when_it_is_loaded() -> None:
+    assert not set(gyroid_cad.__all__) & set(MODULES)

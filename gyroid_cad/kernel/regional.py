@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -85,26 +87,56 @@ _inherited: list[Task] = []
 
 def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
     """What is found in each region."""
+    before = multiprocessing.active_children()
     executor = ProcessPoolExecutor(
         min(processes, len(task.regions)),
         multiprocessing.get_context("fork"),
         # Not sent: a forked process has it already.
-        initializer=_inherited.append,
+        initializer=_begin,
         initargs=(task,),
     )
     done = 0
     try:
-        futures = {executor.submit(_found, number): region for number, region in enumerate(task.regions)}
+        with _interrupts_later():
+            futures = {executor.submit(_found, number): region for number, region in enumerate(task.regions)}
         for future in as_completed(futures):
             future.result()
             done += len(futures[future])
             if progress is not None:
                 progress(done, len(task.faces))
         return [future.result() for future in futures]
+    except KeyboardInterrupt:
+        # Nobody waits for what the kernel is at.
+        for process in multiprocessing.active_children():
+            if process not in before:
+                process.terminate()
+        raise
     except BrokenProcessPool as broken:
         raise KernelError("a process that split the part against the lattice ended too soon") from broken
     finally:
         executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Hold interrupts back until the context ends: what comes while a process is forked, Python reports and forgets."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    if heard:
+        signal.raise_signal(signal.SIGINT)
+
+
+def _begin(task: Task) -> None:
+    """Make a process ready; a terminal interrupts all of a program's processes, and only the first has an answer."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _inherited.append(task)
 
 
 def _found(number: int) -> Found:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any
 
@@ -66,12 +68,25 @@ def _written(writer: Any) -> memoryview:
     import lib3mf
 
     package = BytesIO()
+    problems: list[BaseException] = []
+
+    @contextmanager
+    def told_later() -> Iterator[None]:
+        # Nothing passes through the library: an interrupt, or memory that gives out, would be lost in it.
+        try:
+            yield
+        except BaseException as problem:
+            problems.append(problem)
 
     def write(address: int, count: int, _: object) -> None:
-        package.write(ctypes.string_at(address, count))
+        with told_later():
+            package.write(ctypes.string_at(address, count))
 
     def seek(position: int, _: object) -> None:
-        package.seek(position)
+        with told_later():
+            package.seek(position)
 
     writer.WriteToCallback(lib3mf.WriteCallback(write), lib3mf.SeekCallback(seek), None)
+    if problems:
+        raise problems[0]
     return package.getbuffer()

@@ -1,0 +1,119 @@
+"""Triangles read from STL and 3MF files, in millimetres."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import ParameterError
+
+__all__ = ["TRIANGLE_ENDINGS", "read_triangles"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+TRIANGLE_ENDINGS = (".stl", ".3mf")
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+_HEADER_BYTES = 84
+_EXPECTED = "a file of triangles, binary or text STL, or 3MF"
+
+
+def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
+    """The triangles of an STL or 3MF file.
+
+    STL has no unit: its numbers are taken for millimetres, as printers' programs do. 3MF says its own, and where the
+    parts on its build platform stand. Corners of STL's triangles are one where their numbers are the same to the
+    last bit; triangles without area, which bound nothing, are left out.
+
+    Returns
+    -------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+
+    Raises
+    ------
+    ParameterError
+        If the file cannot be read, or holds no triangles.
+    """
+    target = Path(path)
+    ending = target.suffix.lower()
+    if ending not in TRIANGLE_ENDINGS:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: a name ending in {' or '.join(TRIANGLE_ENDINGS)}")
+    try:
+        with target.open("rb") as file:
+            file.read(1)
+    except OSError as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {problem.strerror}") from None
+    vertices, triangles = _read_3mf(target) if ending == ".3mf" else _merged(_stl_corners(target))
+    if not len(triangles) or not np.isfinite(vertices).all():
+        raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
+    return vertices, triangles
+
+
+def _stl_corners(path: Path) -> Floats:
+    """Three corners of every triangle; shape (triangles, 3, 3)."""
+    size = path.stat().st_size
+    if size >= _HEADER_BYTES:
+        count = int(np.fromfile(path, "<u4", 1, offset=_HEADER_BYTES - 4)[0])
+        # Some programs begin binary files with "solid" too: the size tells them from text for certain.
+        if size == _HEADER_BYTES + count * _RECORD.itemsize:
+            return np.asarray(np.fromfile(path, _RECORD, offset=_HEADER_BYTES)["corners"], dtype=float)
+    try:
+        lines = path.read_text(encoding="ascii").split("\n")
+        corners = [line.split()[1:] for line in lines if line.lstrip().startswith("vertex")]
+        return np.array(corners, dtype=float).reshape(-1, 3, 3)
+    except (UnicodeDecodeError, ValueError):
+        raise ParameterError("file", str(path), _EXPECTED) from None
+
+
+def _merged(corners: Floats) -> tuple[Floats, Integers]:
+    # Minus nought is nought.
+    flat = np.ascontiguousarray(corners.reshape(-1, 3) + 0.0)
+    keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
+    _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
+    triangles = numbers.reshape(-1, 3).astype(np.int64)
+    slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
+    return flat[first], triangles[~slivers]
+
+
+def _read_3mf(path: Path) -> tuple[Floats, Integers]:
+    """Meshes of all parts that are to be built, each where it stands on the platform."""
+    import lib3mf
+
+    wrapper = lib3mf.get_wrapper()
+    try:
+        model = wrapper.CreateModel()
+        model.QueryReader("3mf").ReadFromFile(str(path))
+        # Parts made of others come out as one mesh, placed.
+        flat = model.MergeToModel()
+        unit = _millimetres(model.GetUnit())
+        objects, vertices, triangles, count = flat.GetMeshObjects(), [], [], 0
+        while objects.MoveNext():
+            mesh = objects.GetCurrentMeshObject()
+            places = np.array([tuple(place.Coordinates) for place in mesh.GetVertices()], dtype=float).reshape(-1, 3)
+            facets = [tuple(facet.Indices) for facet in mesh.GetTriangleIndices()]
+            vertices.append(places * unit)
+            triangles.append(np.array(facets, dtype=np.int64).reshape(-1, 3) + count)
+            count += len(places)
+    except lib3mf.ELib3MFException as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: lib3mf says {problem}") from None
+    return np.concatenate([np.zeros((0, 3)), *vertices]), np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles])
+
+
+def _millimetres(unit: Any) -> float:
+    import lib3mf
+
+    sizes = {
+        lib3mf.ModelUnit.MicroMeter: 1e-3,
+        lib3mf.ModelUnit.MilliMeter: 1.0,
+        lib3mf.ModelUnit.CentiMeter: 10.0,
+        lib3mf.ModelUnit.Inch: 25.4,
+        lib3mf.ModelUnit.Foot: 304.8,
+        lib3mf.ModelUnit.Meter: 1000.0,
+    }
+    return sizes[lib3mf.ModelUnit(unit)]

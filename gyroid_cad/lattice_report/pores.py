@@ -1,0 +1,332 @@
+"""How large the pores are: spheres that fit between the walls, by place and by volume.
+
+The distance to the nearest wall is the radius of the largest sphere round a place that fits. Where it is largest
+nearby, in the middle of a labyrinth's nodes, stand the inscribed spheres. By volume, the pore size at a place is the
+diameter of the largest sphere that fits and holds the place, wherever its centre may be: that is the pore-size
+distribution of Gelb and Gubbins (Langmuir 15, 1999, 305-308), the one that porosimetry aims at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.arrays import dot
+from gyroid_cad.complex import build_complex
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.laying import LaidWall
+from gyroid_cad.lattice_report.distributions import Distribution, distribution_of
+from gyroid_cad.lattice_report.nearest import WallFaces, wall_faces
+from gyroid_cad.refit import fitted_wall
+from gyroid_cad.symmetry import CELL_QUARTERS
+from gyroid_cad.wall import Wall
+
+__all__ = ["CONTINUED", "ENDLESS", "OPEN", "ChannelSpheres", "Pores", "inscribed_spheres", "pores_of"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+# Places in all and along a cell: the grid that pore sizes are looked up on.
+_PLACES = 120_000
+_FEWEST_ALONG, _MOST_ALONG = 12, 32
+# Samples looked at: of a place on the grid, and of a sphere's centre, which is as near to three walls or more.
+_NEIGHBOURS, _TOUCHING = 6, 48
+# Centres are moved until the radius they gain is this part of the grid's spacing; coarser where they are many.
+_SETTLED, _SETTLED_ENOUGH = 1e-6, 1e-3
+_MANY = 100
+_MOST_MOVES = 40
+# One step of the linear programme must give this part of what it promises, or the next is to be shorter.
+_KEPT_PROMISE = 0.25
+# In spacings: places that are next to each other, across the cube's diagonal too.
+_BESIDE = 1.75
+# Inscribed spheres whose centres are this near, in spacings of the grid, are one.
+_SAME = 0.5
+# A sphere is left out if one round a neighbouring place is larger by this part of the way: it holds it, all but a
+# sliver.
+_HELD = 0.85
+_BALLS_AT_ONCE = 256
+_NEIGHBOURING = np.array([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
+# How far beyond the block patches are fitted, in cell sizes: the largest pores reach less far.
+_BEYOND = 0.75
+ENDLESS, CONTINUED, OPEN = "endless", "continued", "open"
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelSpheres:
+    """The spheres inscribed in one labyrinth, at the places where the distance to the wall is largest nearby.
+
+    Attributes
+    ----------
+    count : int
+        In a cell of an endless lattice, or in the whole block of one that varies.
+    smallest, largest : float
+        Diameters in mm.
+    """
+
+    count: int
+    smallest: float
+    largest: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pores:
+    """The pores between the walls.
+
+    Attributes
+    ----------
+    beyond : {"endless", "continued", "open"}
+        Whether this is one cell of an endless lattice, or the block of one that varies and is taken to go on a cell
+        beyond its sides, or where it cannot, because a field or the map ends there, the block with open sides.
+    porosity : float
+        Part of the block that is pore, by counting places; the exact one is 1 less the density.
+    spacing : float
+        Of the places looked at, in mm, at their widest.
+    channel_a, channel_b : ChannelSpheres, optional
+        Of the labyrinth that the common normal points to, and of the other; none where no sphere is largest inside
+        the block.
+    sizes : Distribution
+        Diameters in mm, by the volume of the pores.
+    """
+
+    beyond: str
+    porosity: float
+    spacing: float
+    channel_a: ChannelSpheres | None
+    channel_b: ChannelSpheres | None
+    sizes: Distribution
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Grid:
+    """Places in the block, or in one cell of an endless lattice.
+
+    Attributes
+    ----------
+    shape : tuple of int
+    places : ndarray, shape (n, 3)
+        In mm, of the part.
+    volumes : ndarray, shape (n,)
+        That each place stands for, in mm3.
+    period : float, optional
+    spacing : float
+        At its widest.
+    """
+
+    shape: tuple[int, ...]
+    places: Floats
+    volumes: Floats
+    period: float | None
+    spacing: float
+
+
+def pores_of(laid: LaidWall) -> Pores:
+    """Measure the pores of a lattice.
+
+    Of a lattice whose cells are all alike one cell is looked at, as it is among its like. Of one that varies it is the
+    block of cells, where the map carries it: spheres have their centres in the block. Those near its sides meet the
+    walls that would come next, fitted for this; else every pore on the border would seem larger than it is.
+
+    Parameters
+    ----------
+    laid : LaidWall
+
+    Returns
+    -------
+    Pores
+    """
+    grid = _grid(laid)
+    faces, beyond = _faces(laid)
+    radii, outside, sides = faces.feet(grid.places, _NEIGHBOURS).nearest()
+    radii = np.where(outside, radii, 0.0)
+    centres, largest, channel = _inscribed(faces, grid, radii, sides)
+    return Pores(
+        beyond=beyond,
+        porosity=float(grid.volumes[outside].sum() / grid.volumes.sum()),
+        spacing=grid.spacing,
+        channel_a=_spheres(largest[channel == 1]),
+        channel_b=_spheres(largest[channel == 0]),
+        sizes=distribution_of(
+            2 * _covering_radii(grid, radii, outside, centres, largest), grid.volumes[outside]
+        ),
+    )
+
+
+def inscribed_spheres(laid: LaidWall) -> tuple[Floats, Floats, Integers]:
+    """The inscribed spheres themselves, as counted by :func:`pores_of`.
+
+    Returns
+    -------
+    centres : ndarray, shape (n, 3)
+        In mm; of an endless lattice those in one cell.
+    radii : ndarray, shape (n,)
+        In mm.
+    channels : ndarray of int, shape (n,)
+        1 for the labyrinth that the common normal points to, 0 for the other.
+    """
+    grid = _grid(laid)
+    faces, _ = _faces(laid)
+    radii, outside, sides = faces.feet(grid.places, _NEIGHBOURS).nearest()
+    return _inscribed(faces, grid, np.where(outside, radii, 0.0), sides)
+
+
+def _faces(laid: LaidWall) -> tuple[WallFaces, str]:
+    """What bounds the pores, and what there is beyond the block's sides."""
+    grading, wall = laid.recipe.grading, laid.wall
+    if grading.uniform:
+        return wall_faces(wall, grading.cell_size), ENDLESS
+    try:
+        return wall_faces(_continued(laid), None), CONTINUED
+    except ParameterError:
+        return wall_faces(wall, None), OPEN
+
+
+def _continued(laid: LaidWall) -> Wall:
+    """The wall of a lattice that varies, with the patches that would come next beyond the block's open sides.
+
+    Raises
+    ------
+    ParameterError
+        If a field or the map is no good there.
+    """
+    recipe, grading = laid.recipe, laid.recipe.grading
+    closed, cells, placements = np.array(grading.closed), np.array(recipe.cells), grading.surface.cell
+    centres = placements.translations / CELL_QUARTERS
+
+    def near(placement: Integers, cell: Integers) -> Booleans:
+        places = centres[placement] + cell
+        return np.asarray(np.all(closed | ((places > -_BEYOND) & (places < cells + _BEYOND)), axis=1))
+
+    nx, ny, nz = (cells + 2 * ~closed).tolist()
+    x, y, z = (-1 * ~closed).tolist()
+    complex = build_complex((nx, ny, nz), placements, grading.closed, first=(x, y, z), wanted=near)
+    return fitted_wall(complex, grading, len(laid.wall.weights))
+
+
+def _grid(laid: LaidWall) -> _Grid:
+    grading, cells = laid.recipe.grading, laid.recipe.cells
+    endless = grading.uniform
+    counted = (1, 1, 1) if endless else cells
+    along = int(np.clip((_PLACES / np.prod(counted)) ** (1 / 3), _FEWEST_ALONG, _MOST_ALONG))
+    shape = tuple(along * count for count in counted)
+    axes = [(np.arange(count) + 0.5) / along * grading.cell_size for count in shape]
+    own = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    images, _, determinant = grading.carry(own)
+    places = np.ascontiguousarray(images.T)
+    size = grading.cell_size / along
+    grid = places.reshape(*shape, 3)
+    spacing = max(float(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max(initial=0.0)) for axis in range(3))
+    volumes = np.broadcast_to(np.asarray(determinant) * size**3, len(places))
+    return _Grid(shape, places, volumes, grading.cell_size if endless else None, spacing)
+
+
+def _neighbours(grid: _Grid) -> Iterator[tuple[Integers, Booleans]]:
+    """For each of 26 directions, the place next to every place, and whether there is one."""
+    index = np.stack(np.unravel_index(np.arange(len(grid.places)), grid.shape), axis=1)
+    for step in _NEIGHBOURING:
+        other = index + step
+        within = np.all((other >= 0) & (other < grid.shape), axis=1)
+        if grid.period is not None:
+            within[:] = True
+        other = np.mod(other, grid.shape)
+        yield np.ravel_multi_index(tuple(other.T), grid.shape), within
+
+
+def _inscribed(faces: WallFaces, grid: _Grid, radii: Floats, sides: Integers) -> tuple[Floats, Floats, Integers]:
+    """Centres, radii and labyrinths of the largest spheres nearby."""
+    top = radii > 0
+    for other, within in _neighbours(grid):
+        # At the block's sides the next larger sphere may stand just outside.
+        top &= within & (radii >= radii[other])
+    starts = np.flatnonzero(top)
+    if not len(starts):
+        return np.empty((0, 3)), np.empty(0), np.empty(0, dtype=np.int64)
+    # Places of a grid that lie round a centre alike are all as good: one is enough.
+    starts = starts[_distinct(grid.places[starts], radii[starts], _BESIDE * grid.spacing, grid.period)]
+    centres, found = _settled(faces, grid.places[starts], radii[starts], grid.spacing)
+    if grid.period is not None:
+        centres = np.mod(centres, grid.period)
+    kept = _distinct(centres, found, _SAME * grid.spacing, grid.period)
+    return centres[kept], found[kept], sides[starts][kept]
+
+
+def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -> tuple[Floats, Floats]:
+    """Move centres until their spheres are as large as they get.
+
+    The radius is the least of the distances to the feet, and each of these grows with the way along its own
+    direction: a linear programme says where all of them grow most, within a step that gets shorter where it promised
+    too much (sequential linear programming).
+    """
+    from scipy.optimize import linprog
+
+    centres, radii = centres.copy(), radii.copy()
+    reach = np.full(len(centres), spacing / 2)
+    moving = np.arange(len(centres))
+    least = spacing * (_SETTLED if len(centres) <= _MANY else _SETTLED_ENOUGH)
+    for _ in range(_MOST_MOVES):
+        feet = faces.feet(centres[moving], _TOUCHING)
+        gains = np.zeros(len(moving))
+        steps = np.zeros((len(moving), 3))
+        for row, (away, distance) in enumerate(zip(feet.away, feet.distance, strict=True)):
+            rows = np.column_stack([-away / distance[:, np.newaxis], np.ones(len(distance))])
+            bounds = [(-reach[moving[row]], reach[moving[row]])] * 3 + [(None, None)]
+            best = linprog([0.0, 0.0, 0.0, -1.0], rows, distance, bounds=bounds)
+            if best.status == 0:
+                steps[row], gains[row] = best.x[:3], best.x[3] - distance.min()
+        tried, outside, _ = faces.feet(centres[moving] + steps, _TOUCHING).nearest()
+        better = outside & (tried > radii[moving])
+        promised = np.where(better, (tried - radii[moving]) >= _KEPT_PROMISE * gains, False)
+        centres[moving[better]] += steps[better]
+        radii[moving[better]] = tried[better]
+        reach[moving[~promised]] /= 4
+        moving = moving[(gains > least) & (reach[moving] > least)]
+        if not len(moving):
+            break
+    return centres, radii
+
+
+def _distinct(centres: Floats, radii: Floats, apart: float, period: float | None) -> Integers:
+    """Of spheres with nearly one centre, the largest."""
+    from scipy.spatial import cKDTree
+
+    order = np.argsort(-radii, kind="stable")
+    tree: Any = cKDTree(centres[order]) if period is None else cKDTree(centres[order], boxsize=period)
+    kept = np.ones(len(order), dtype=bool)
+    for first, second in tree.query_pairs(apart, output_type="ndarray"):
+        kept[max(first, second)] = False
+    return np.sort(order[kept])
+
+
+def _covering_radii(grid: _Grid, radii: Floats, outside: Booleans, centres: Floats, largest: Floats) -> Floats:
+    """At every place of the pores, the radius of the largest sphere that holds it."""
+    from scipy.spatial import cKDTree
+
+    medial = radii > 0
+    for other, within in _neighbours(grid):
+        apart = grid.places[other] - grid.places
+        if grid.period is not None:
+            apart -= grid.period * np.round(apart / grid.period)
+        medial &= ~(within & (radii[other] - radii >= _HELD * np.sqrt(dot(apart, apart))))
+    all_centres = np.concatenate([grid.places[medial], centres])
+    all_radii = np.concatenate([radii[medial], largest])
+    places, sizes = grid.places[outside], radii[outside].copy()
+    tree: Any = cKDTree(places) if grid.period is None else cKDTree(places, boxsize=grid.period)
+    # From the largest down: what is held by a larger sphere is held already.
+    order = np.argsort(-all_radii)
+    for first in range(0, len(order), _BALLS_AT_ONCE):
+        some = order[first : first + _BALLS_AT_ONCE]
+        held = tree.query_ball_point(all_centres[some], all_radii[some])
+        counts = [len(places_held) for places_held in held]
+        flat = np.concatenate([np.asarray(places_held, dtype=np.int64) for places_held in held])
+        np.maximum.at(sizes, flat, np.repeat(all_radii[some], counts))
+    return sizes
+
+
+def _spheres(radii: Floats) -> ChannelSpheres | None:
+    if not len(radii):
+        return None
+    return ChannelSpheres(len(radii), 2 * float(radii.min()), 2 * float(radii.max()))

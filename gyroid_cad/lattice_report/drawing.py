@@ -16,16 +16,18 @@ from gyroid_cad.arrays import dot, freeze_arrays
 __all__ = ["VIEWS", "Facets", "View", "data_uri", "drawn", "png"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 # Pixels are drawn so many times finer, along both sides, and averaged.
 _FINER = 2
-_FRAGMENTS_AT_ONCE = 2_000_000
+_FRAGMENTS_AT_ONCE = 100_000
 # Part of the picture left free round what is drawn.
 _MARGIN = 0.03
 # Light: from the viewer's upper left, and some from everywhere.
 _LIGHT = np.array([-0.35, 0.5, 0.8]) / np.linalg.norm([-0.35, 0.5, 0.8])
-_AMBIENT, _DIFFUSE = 0.38, 0.66
+_AMBIENT, _DIFFUSE = 0.5, 0.56
+_NO_LENGTH = 1e-30
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +76,14 @@ class Facets:
         At the corners, out of the solid; of any length but nought.
     colours : ndarray, shape (n, 3)
         Red, green and blue from 0 to 1.
+    closed : bool
+        Whether they bound solids, counterclockwise seen from outside: then none is ever seen from behind.
     """
 
     corners: Floats
     normals: Floats
     colours: Floats
+    closed: bool
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -109,26 +114,33 @@ def drawn(facets: Facets, view: View, size: int) -> Bytes:
     placed[..., 1] = (high[1] - points[..., 1]) * scale + margin
     placed[..., 2] = points[..., 2]
     depths = np.full(width * height, -np.inf)
-    shades = np.zeros((width * height, 3))
-    for pixels, depth, which, shares in _fragments(placed, width, height):
-        nearer = depth > depths[pixels]
-        pixels, depth, which, shares = pixels[nearer], depth[nearer], which[nearer], shares[nearer]
+    owners = np.zeros(width * height, dtype=np.int64)
+    portions = np.zeros((width * height, 3))
+    for pixels, depth, which, shares in _fragments(placed, facets.closed, width, height):
+        nearer = np.flatnonzero(depth > depths[pixels])
         # Of fragments in one pixel the nearest is to be written last.
-        order = np.argsort(depth, kind="stable")
-        pixels, which, shares = pixels[order], which[order], shares[order]
-        depths[pixels] = depth[order]
-        normal = np.einsum("nk,nkc->nc", shares, facets.normals[which]) @ view.axes.T
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        # What is seen from behind, in a surface that is not closed, is lit too.
-        normal *= np.where(normal[:, 2:] < 0, -1.0, 1.0)
-        light = _AMBIENT + _DIFFUSE * np.maximum(dot(normal, _LIGHT), 0.0)
-        shades[pixels] = np.minimum(facets.colours[which] * light[:, np.newaxis], 1.0)
-    return _averaged(shades, np.isfinite(depths), width, height)
+        nearer = nearer[np.argsort(depth[nearer], kind="stable")]
+        pixels = pixels[nearer]
+        depths[pixels], owners[pixels], portions[pixels] = depth[nearer], which[nearer], shares[nearer]
+    covered = np.isfinite(depths)
+    shades = np.zeros((width * height, 3))
+    shades[covered] = _shaded(facets, owners[covered], portions[covered], view)
+    return _averaged(shades, covered, width, height)
+
+
+def _shaded(facets: Facets, which: Integers, shares: Floats, view: View) -> Floats:
+    """Colours at places of triangles, lit."""
+    normal = np.einsum("nk,nkc->nc", shares, facets.normals[which]) @ view.axes.T
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _NO_LENGTH)
+    # What is seen from behind, in a surface that is not closed, is lit too.
+    normal *= np.where(normal[:, 2:] < 0, -1.0, 1.0)
+    light = _AMBIENT + _DIFFUSE * np.maximum(dot(normal, _LIGHT), 0.0)
+    return np.minimum(facets.colours[which] * light[:, np.newaxis], 1.0)
 
 
 def _fragments(
-    placed: Floats, width: int, height: int
-) -> Iterator[tuple[NDArray[np.int64], Floats, NDArray[np.int64], Floats]]:
+    placed: Floats, closed: bool, width: int, height: int
+) -> Iterator[tuple[Integers, Floats, Integers, Floats]]:
     """Pixels that triangles cover: number of pixel, depth, triangle, and shares of its three corners."""
     low = np.floor(placed[..., :2].min(axis=1) - 0.5).astype(np.int64).clip(0)
     high = np.ceil(placed[..., :2].max(axis=1) - 0.5).astype(np.int64)
@@ -136,7 +148,9 @@ def _fragments(
     extent = high - low + 1
     a, b, c = (placed[:, k, :2] for k in range(3))
     twice = _cross(b - a, c - a)
-    seen = np.flatnonzero((np.abs(twice) > 0) & np.all(extent > 0, axis=1))
+    # Down the picture is the other way round. Of closed surfaces the back is never seen.
+    facing = twice < 0 if closed else twice != 0
+    seen = np.flatnonzero(facing & np.all(extent > 0, axis=1))
     # Triangles whose boxes are about as large go together.
     classes = np.ceil(np.log2(np.maximum(extent[seen], 1))).astype(np.int64)
     for kind in np.unique(classes, axis=0).tolist():

@@ -42,9 +42,9 @@ def facets_of_wall(wall: Wall) -> Facets:
     parts = []
     for side in SIDES:
         placed = points[wall.patch_net, side] + shifts[:, np.newaxis, np.newaxis]
-        parts.append(_squares(placed, (2 * side - 1) * normals[wall.patch_net, side], COLOURS[side]))
+        parts.append(_squares(placed, normals[wall.patch_net, side], COLOURS[side], backwards=side == 0))
     parts.append(_side_walls(wall, samples))
-    return Facets(*(np.concatenate([part[k] for part in parts]) for k in range(3)))
+    return Facets(*(np.concatenate([part[k] for part in parts]) for k in range(3)), closed=True)
 
 
 def _side_walls(wall: Wall, samples: Floats) -> tuple[Floats, Floats, Floats]:
@@ -63,24 +63,30 @@ def _side_walls(wall: Wall, samples: Floats) -> tuple[Floats, Floats, Floats]:
     return _squares(points + wall.shifts[wall.patch_shift[patches]][:, np.newaxis, np.newaxis], normals, COLOURS[2])
 
 
-def _squares(points: Floats, normals: Floats, colour: tuple[float, float, float]) -> tuple[Floats, Floats, Floats]:
-    """Triangles of grids, shape (grids, a, b, 3): corners, normals and colours."""
+def _squares(
+    points: Floats, normals: Floats, colour: tuple[float, float, float], backwards: bool = False
+) -> tuple[Floats, Floats, Floats]:
+    """Triangles of grids, shape (grids, a, b, 3): corners, normals and colours; turned round where they face inwards."""
     corners = []
     for grid in (points, normals):
         a, b, c, d = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
         halves = np.stack([np.stack([a, b, c], axis=-2), np.stack([a, c, d], axis=-2)], axis=-3)
         corners.append(halves.reshape(-1, 3, 3))
+    if backwards:
+        corners = [corners[0][:, ::-1], -corners[1][:, ::-1]]
     return corners[0], corners[1], np.tile(np.array(colour), (len(corners[0]), 1))
 
 
-def facets_of_triangles(vertices: Floats, triangles: Integers) -> Facets:
+def facets_of_triangles(vertices: Floats, triangles: Integers, closed: bool) -> Facets:
     """Triangles with normals of their own.
 
     Parameters
     ----------
     vertices : ndarray, shape (n, 3)
     triangles : ndarray of int, shape (m, 3)
+    closed : bool
+        Whether they bound solids, counterclockwise seen from outside.
     """
     corners = np.asarray(vertices, dtype=float)[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return Facets(corners, np.repeat(normals[:, np.newaxis], 3, axis=1), np.tile(COLOURS[0], (len(corners), 1)))
+    return Facets(corners, np.repeat(normals[:, np.newaxis], 3, axis=1), np.tile(COLOURS[0], (len(corners), 1)), closed)

@@ -19,9 +19,10 @@ __all__ = ["FaceAreas", "WallThickness", "exact_areas", "fitted_areas", "wall_th
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Gauss points along each side of a patch: of what is integrated exactly, and of what is only counted.
+# Gauss points along each side of a patch: of what is integrated exactly, and of what is only counted, of which there are
+# to be so many in all.
 _QUADRATURE_POINTS = 16
-_MEASURED_POINTS = 9
+_FEWEST_MEASURED, _MOST_MEASURED, _MEASURED = 8, 48, 200_000
 # In mm to micrometres.
 _MICRO = 1e3
 
@@ -71,9 +72,10 @@ def wall_thickness(laid: LaidWall) -> WallThickness:
     WallThickness
     """
     grading, wall = laid.recipe.grading, laid.wall
-    nodes, gauss = np.polynomial.legendre.leggauss(_MEASURED_POINTS)
-    rate, shape = differentiation_matrix(nodes), (-1, len(nodes), len(nodes))
     patches = _told_apart(laid)
+    along = int(np.clip(np.sqrt(_MEASURED / len(patches)), _FEWEST_MEASURED, _MOST_MEASURED))
+    nodes, gauss = np.polynomial.legendre.leggauss(along)
+    rate, shape = differentiation_matrix(nodes), (-1, along, along)
     walls, asked, weights = [], [], []
     for some, exact in laid_patches(laid.complex, grading, nodes, patches):
         chosen = patches[some]

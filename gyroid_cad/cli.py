@@ -14,6 +14,7 @@ import click
 from gyroid_cad.cli_fill import fill_command
 from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name, printed_options
 from gyroid_cad.cli_mesh import mesh_command, volumes_command
+from gyroid_cad.cli_report import report_command
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.tables import print_summary, print_table, print_triangles, shown_progress
 from gyroid_cad.version import __version__
@@ -104,6 +105,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
 commands.add_command(fill_command)
 commands.add_command(mesh_command)
 commands.add_command(volumes_command)
+commands.add_command(report_command)
 
 
 @commands.command("fit-report")

@@ -1,0 +1,99 @@
+"""``gyroid-cad report``: a lattice, or what a file holds, on one page or as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.tables import print_table, shown_progress
+
+if TYPE_CHECKING:
+    from gyroid_cad.lattice_report.data import Report
+    from gyroid_cad.stages import Progress
+
+__all__ = ["report_command"]
+
+# Of how the report is given, whatever it is on.
+_COMMON = {"config", "output", "as_json", "quiet", "help"}
+
+
+@click.command("report")
+@click.option("-o", "--output", metavar="FILE.html", help="One page that needs nothing else: opens offline.")
+@lattice_options
+@click.option(
+    "--subdivisions",
+    type=int,
+    default=8,
+    show_default=True,
+    metavar="N",
+    help="Elements along each side of a patch, of the mesh whose quality is told.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--quiet", is_flag=True, help="Print nothing and no progress.")
+def report_command(output: str | None, subdivisions: int, as_json: bool, quiet: bool, **given: Any) -> None:
+    """Report on a lattice, or on a STEP, BREP, STL or 3MF file.
+
+    Of a lattice, described as for "build" by options or in a TOML file: pictures, wall thickness, pore sizes, density,
+    areas, exact against fitted, element quality. Of a file, named in place of LATTICE.toml: pictures, size, volume and
+    area, and whether it is closed and valid.
+
+    \b
+    gyroid-cad report -o lattice.html --cells 2 2 2 --cell-size 10 --thickness 0.8
+    gyroid-cad report lattice.toml -o lattice.html --json
+    gyroid-cad report part.step -o part.html
+    """
+    start = time.perf_counter()
+    from gyroid_cad.lattice_report.page import require_page, write_page
+
+    if output is None and not as_json:
+        raise click.UsageError("Missing option '-o' / '--output', or --json.")
+    if output is not None:
+        require_page(output)
+    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
+        report = _report(given, subdivisions, progress)
+        if output is not None:
+            write_page(report, output)
+    if as_json:
+        click.echo(json.dumps(report.as_dict()))
+    elif not quiet and output is not None:
+        _print(report, output, time.perf_counter() - start)
+
+
+def _report(given: dict[str, Any], subdivisions: int, progress: Progress | None) -> Report:
+    from gyroid_cad.lattice_report.data import report_on_file, report_on_lattice, require_subdivisions
+    from gyroid_cad.lattice_report.file_data import is_report_file
+
+    path = given["config"]
+    if path is None or path.lower().endswith(".toml"):
+        require_subdivisions(subdivisions)
+        return report_on_lattice(lattice_of(given), subdivisions, progress)
+    if not is_report_file(path):
+        from gyroid_cad.formats import FORMATS
+
+        raise ParameterError("file", path, f"a lattice in a .toml file, or a file ending in {', '.join(FORMATS)}")
+    context = click.get_current_context()
+    line = click.core.ParameterSource.COMMANDLINE
+    mixed = [name for name in context.params if name not in _COMMON and context.get_parameter_source(name) == line]
+    if mixed:
+        raise click.UsageError(f"of a file there is nothing to choose: without {', '.join(map(option_name, mixed))}")
+    return report_on_file(path, progress)
+
+
+def _print(report: Report, output: str, seconds: float) -> None:
+    rows = [("report on", report.title)]
+    values = report.as_dict()
+    if report.kind == "lattice":
+        measures, sizes = values["measures"], values["pores"]["sizes"]
+        rows += [
+            ("density", f"{measures['density']:.5f}"),
+            ("pore sizes", f"{sizes['smallest']:.4g} to {sizes['largest']:.4g} mm, median {sizes['median']:.4g} mm"),
+            ("area / volume", f"{measures['area_per_volume']:.5g} mm2/mm3"),
+        ]
+    print_table(None, [*rows, (output, f"{Path(output).stat().st_size:,} bytes"), ("time", f"{seconds:.2f} s")])

@@ -93,7 +93,7 @@ def _print(report: Report, output: str, seconds: float) -> None:
         measures, sizes = values["measures"], values["pores"]["sizes"]
         rows += [
             ("density", f"{measures['density']:.5f}"),
-            ("pore sizes", f"{sizes['smallest']:.4g} to {sizes['largest']:.4g} mm, median {sizes['median']:.4g} mm"),
+            ("pore sizes", f"median {sizes['median']:.4g} mm, largest {sizes['largest']:.4g} mm"),
             ("area / volume", f"{measures['area_per_volume']:.5g} mm2/mm3"),
         ]
     print_table(None, [*rows, (output, f"{Path(output).stat().st_size:,} bytes"), ("time", f"{seconds:.2f} s")])

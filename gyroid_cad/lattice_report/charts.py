@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from itertools import pairwise
 from math import ceil, floor, log10
 
 __all__ = ["histogram", "ticks"]
@@ -45,7 +46,10 @@ def histogram(
     base = upwards(0.0)
     parts = [
         f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="Histogram: {escape(axis)}">',
-        *(f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{upwards(p):.1f}" y2="{upwards(p):.1f}"/>' for p in up),
+        *(
+            f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{upwards(p):.1f}" y2="{upwards(p):.1f}"/>'
+            for p in up
+        ),
         *(
             f'<text class="tick" x="{_LEFT - 7}" y="{upwards(p) + 4:.1f}" text-anchor="end">{_label(p, up)} %</text>'
             for p in up
@@ -97,6 +101,6 @@ def ticks(low: float, high: float, most: int) -> list[float]:
 
 def _label(value: float, among: Sequence[float]) -> str:
     """As many digits as tell the ticks apart."""
-    step = min((b - a for a, b in zip(among[:-1], among[1:], strict=True)), default=abs(value) or 1.0)
+    step = min((b - a for a, b in pairwise(among)), default=abs(value) or 1.0)
     decimals = max(0, -floor(log10(step) + 1e-9))
     return f"{value + 0.0:.{decimals}f}" if decimals <= 7 else f"{value:.8g}"

@@ -183,7 +183,11 @@ def parameters_section(subject: Subject) -> Values:
         "surface": lattice.surface,
         "cells": list(lattice.cells),
         "cell_size": lattice.cell_size,
-        **{name: value if isinstance(value, float) else str(value) for name, value in fields.items() if value is not None},
+        **{
+            name: value if isinstance(value, float) else str(value)
+            for name, value in fields.items()
+            if value is not None
+        },
         **({} if lattice.trim is None else {"trim": lattice.trim}),
         **({} if lattice.tolerance is None else {"tolerance": lattice.tolerance}),
         "control_points": len(lattice.laid().wall.weights),
@@ -288,7 +292,10 @@ def pores_section(subject: Subject) -> Values:
         "beyond": found.beyond,
         "spacing": found.spacing,
         "porosity_counted": found.porosity,
-        **{name: {NONE: "no sphere is largest inside"} if some is None else asdict(some) for name, some in spheres.items()},
+        **{
+            name: {NONE: "no sphere is largest inside"} if some is None else asdict(some)
+            for name, some in spheres.items()
+        },
         "sizes": found.sizes.as_dict(),
     }
 

@@ -120,8 +120,8 @@ def drawn(facets: Facets, view: View, size: int) -> Bytes:
         nearer = np.flatnonzero(depth > depths[pixels])
         # Of fragments in one pixel the nearest is to be written last.
         nearer = nearer[np.argsort(depth[nearer], kind="stable")]
-        pixels = pixels[nearer]
-        depths[pixels], owners[pixels], portions[pixels] = depth[nearer], which[nearer], shares[nearer]
+        seen = pixels[nearer]
+        depths[seen], owners[seen], portions[seen] = depth[nearer], which[nearer], shares[nearer]
     covered = np.isfinite(depths)
     shades = np.zeros((width * height, 3))
     shades[covered] = _shaded(facets, owners[covered], portions[covered], view)

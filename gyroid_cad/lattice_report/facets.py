@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,7 +46,8 @@ def facets_of_wall(wall: Wall) -> Facets:
         placed = points[wall.patch_net, side] + shifts[:, np.newaxis, np.newaxis]
         parts.append(_squares(placed, normals[wall.patch_net, side], COLOURS[side], backwards=side == 0))
     parts.append(_side_walls(wall, samples))
-    return Facets(*(np.concatenate([part[k] for part in parts]) for k in range(3)), closed=True)
+    corners, normals, colours = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    return Facets(corners, normals, colours, closed=True)
 
 
 def _side_walls(wall: Wall, samples: Floats) -> tuple[Floats, Floats, Floats]:
@@ -66,7 +69,7 @@ def _side_walls(wall: Wall, samples: Floats) -> tuple[Floats, Floats, Floats]:
 def _squares(
     points: Floats, normals: Floats, colour: tuple[float, float, float], backwards: bool = False
 ) -> tuple[Floats, Floats, Floats]:
-    """Triangles of grids, shape (grids, a, b, 3): corners, normals and colours; turned round where they face inwards."""
+    """Triangles of grids, shape (grids, a, b, 3): corners, normals, colours; turned round if they face inwards."""
     corners = []
     for grid in (points, normals):
         a, b, c, d = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
@@ -77,7 +80,7 @@ def _squares(
     return corners[0], corners[1], np.tile(np.array(colour), (len(corners[0]), 1))
 
 
-def facets_of_triangles(vertices: Floats, triangles: Integers, closed: bool) -> Facets:
+def facets_of_triangles(vertices: NDArray[Any], triangles: NDArray[Any], closed: bool) -> Facets:
     """Triangles with normals of their own.
 
     Parameters

@@ -112,9 +112,7 @@ def _triangles_of(path: Path) -> FileContents:
     return FileContents(path, measures, facets, triangles=read)
 
 
-def _sizes(
-    low: tuple[float, ...], high: tuple[float, ...], volume: float | None, area: float
-) -> dict[str, Any]:
+def _sizes(low: tuple[float, ...], high: tuple[float, ...], volume: float | None, area: float) -> dict[str, Any]:
     extent = [b - a for a, b in zip(low, high, strict=True)]
     box = extent[0] * extent[1] * extent[2]
     sizes: dict[str, Any] = {"bounding_box_low": list(low), "bounding_box_high": list(high), "extent": extent}

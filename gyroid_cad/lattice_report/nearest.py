@@ -12,7 +12,7 @@ from gyroid_cad.arrays import dot, freeze_arrays
 from gyroid_cad.nurbs import NurbsSurface, basis
 from gyroid_cad.wall import SIDES, Wall
 
-__all__ = ["Feet", "WallFaces", "wall_faces"]
+__all__ = ["Feet", "WallFaces", "tree_of", "wall_faces"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -72,6 +72,8 @@ class WallFaces:
         Between samples, in parameters.
     period : float, optional
         In mm, along x, y and z alike, if the wall goes on endlessly.
+    tree : scipy.spatial.cKDTree
+        Of the points.
     """
 
     points: Floats
@@ -135,8 +137,6 @@ def wall_faces(wall: Wall, period: float | None) -> WallFaces:
     period : float, optional
         Of an endless wall, in mm: then of patches that are alike one is sampled.
     """
-    from scipy.spatial import cKDTree
-
     patches = np.arange(wall.complex.patch_count)
     if period is not None:
         patches = np.unique(wall.patch_net, return_index=True)[1]
@@ -153,8 +153,15 @@ def wall_faces(wall: Wall, period: float | None) -> WallFaces:
         points = np.mod(points, period)
         # Rounding may leave a small negative number at the period itself.
         points[points >= period] = 0.0
-    tree = cKDTree(points) if period is None else cKDTree(points, boxsize=period)
-    return WallFaces(points, values[1:].reshape(5, -1, 3), normals, side, 2 / steps, period, tree)
+    derivatives = values[1:].reshape(5, -1, 3)
+    return WallFaces(points, derivatives, normals, side, 2 / steps, period, tree_of(points, period))
+
+
+def tree_of(points: Floats, period: float | None) -> Any:
+    """A tree in which to look up points (``scipy.spatial.cKDTree``), which repeat if there is a period."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points, boxsize=period)  # type: ignore[arg-type]
 
 
 def _derivatives(wall: Wall, nets: Floats, samples: Floats) -> Floats:

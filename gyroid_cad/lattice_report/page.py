@@ -53,6 +53,8 @@ _FACTS = (
     ("file", "area", "area"),
     ("file", "closed", "closed"),
 )
+# In the order of their colours.
+_FACES = ("face B", "face A", "rim")
 _FACT_UNITS = {"pore size, median": "mm", "largest pore": "mm"}
 
 
@@ -116,7 +118,9 @@ def _facts(report: Report) -> str:
         if value is not None:
             unit = _FACT_UNITS.get(label, label_of(path)[1])
             shown = _shown(value, f"{section}.{path}", digits=4)
-            cards.append(f'<div class="fact"><b>{shown}</b><span>{escape(label)}{", " + unit if unit else ""}</span></div>')
+            cards.append(
+                f'<div class="fact"><b>{shown}</b><span>{escape(label)}{", " + unit if unit else ""}</span></div>'
+            )
     return f'<div class="facts">{"".join(cards)}</div>' if cards else ""
 
 
@@ -131,15 +135,16 @@ def _pictures(facets: Facets | None, kind: str) -> str:
             f'<figure><img src="{data_uri(png(picture))}" width="{width}" height="{height}" '
             f'alt="{escape(view.name)}"><figcaption>{escape(view.name)}</figcaption></figure>'
         )
-    key = ""
     # What the kernel or a file gives has one colour.
-    if kind == "lattice" and len({tuple(colour) for colour in facets.colours[[0, -1]].tolist()}) > 1:
-        names = ("face B", "face A", "rim")
-        key = '<p class="note">' + "".join(
-            f'<span class="key" style="background:rgb({",".join(str(round(255 * c)) for c in colour)})"></span>{name}'
-            for name, colour in zip(names, COLOURS, strict=True)
-        ) + "</p>"
-    return f'<section><h2>From the corner and from three sides</h2>{key}<div class="views">{"".join(figures)}</div></section>'
+    several = kind == "lattice" and len({tuple(colour) for colour in facets.colours[[0, -1]].tolist()}) > 1
+    key = f'<p class="note">{"".join(map(_swatch, _FACES, COLOURS))}</p>' if several else ""
+    views = f'<div class="views">{"".join(figures)}</div>'
+    return f"<section><h2>From the corner and from three sides</h2>{key}{views}</section>"
+
+
+def _swatch(name: str, colour: tuple[float, float, float]) -> str:
+    mixed = ",".join(str(round(255 * part)) for part in colour)
+    return f'<span class="key" style="background:rgb({mixed})"></span>{escape(name)}'
 
 
 def _section(name: str, values: Values) -> str:
@@ -159,9 +164,10 @@ def _table(values: Values, key: str) -> str:
         label, unit = label_of(name)
         where = f"{key}.{name}"
         if isinstance(value, Mapping):
-            below.append(f"<h3>{escape(label.capitalize())}</h3>" + (
-                f"<p>None: {escape(str(value[NONE]))}.</p>" if NONE in value else _table(value, where)
-            ))
+            below.append(
+                f"<h3>{escape(label.capitalize())}</h3>"
+                + (f"<p>None: {escape(str(value[NONE]))}.</p>" if NONE in value else _table(value, where))
+            )
         elif isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
             below.append(f"<h3>{escape(label.capitalize())}</h3>{_rows(value, where)}")
         elif not (isinstance(value, list) and len(value) > _SIGNIFICANT):
@@ -247,7 +253,7 @@ def _shown(value: Any, key: str, digits: int = _SIGNIFICANT) -> str:
     if isinstance(value, int | float):
         return f'<data value="{value!r}" data-key="{escape(key)}">{escape(_rounded(value, digits))}</data>'
     if isinstance(value, list):
-        joined = " × " if key.endswith(("cells", "extent")) else ", "
+        joined = " x " if key.endswith(("cells", "extent")) else ", "
         return joined.join(_shown(part, f"{key}.{index}", digits) for index, part in enumerate(value))
     return escape(str(value))
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import dot
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.laying import LaidWall
 from gyroid_cad.lattice_report.distributions import Distribution, distribution_of
-from gyroid_cad.lattice_report.nearest import WallFaces, wall_faces
+from gyroid_cad.lattice_report.nearest import WallFaces, tree_of, wall_faces
+from gyroid_cad.laying import LaidWall
 from gyroid_cad.refit import fitted_wall
 from gyroid_cad.symmetry import CELL_QUARTERS
 from gyroid_cad.wall import Wall
@@ -150,9 +150,7 @@ def pores_of(laid: LaidWall) -> Pores:
         spacing=grid.spacing,
         channel_a=_spheres(largest[channel == 1]),
         channel_b=_spheres(largest[channel == 0]),
-        sizes=distribution_of(
-            2 * _covering_radii(grid, radii, outside, centres, largest), grid.volumes[outside]
-        ),
+        sizes=distribution_of(2 * _covering_radii(grid, radii, outside, centres, largest), grid.volumes[outside]),
     )
 
 
@@ -274,7 +272,7 @@ def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -
         for row, (away, distance) in enumerate(zip(feet.away, feet.distance, strict=True)):
             rows = np.column_stack([-away / distance[:, np.newaxis], np.ones(len(distance))])
             bounds = [(-reach[moving[row]], reach[moving[row]])] * 3 + [(None, None)]
-            best = linprog([0.0, 0.0, 0.0, -1.0], rows, distance, bounds=bounds)
+            best: Any = linprog([0.0, 0.0, 0.0, -1.0], rows, distance, bounds=bounds)
             if best.status == 0:
                 steps[row], gains[row] = best.x[:3], best.x[3] - distance.min()
         tried, outside, _ = faces.feet(centres[moving] + steps, _TOUCHING).nearest()
@@ -291,10 +289,8 @@ def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -
 
 def _distinct(centres: Floats, radii: Floats, apart: float, period: float | None) -> Integers:
     """Of spheres with nearly one centre, the largest."""
-    from scipy.spatial import cKDTree
-
     order = np.argsort(-radii, kind="stable")
-    tree: Any = cKDTree(centres[order]) if period is None else cKDTree(centres[order], boxsize=period)
+    tree = tree_of(centres[order], period)
     kept = np.ones(len(order), dtype=bool)
     for first, second in tree.query_pairs(apart, output_type="ndarray"):
         kept[max(first, second)] = False
@@ -303,8 +299,6 @@ def _distinct(centres: Floats, radii: Floats, apart: float, period: float | None
 
 def _covering_radii(grid: _Grid, radii: Floats, outside: Booleans, centres: Floats, largest: Floats) -> Floats:
     """At every place of the pores, the radius of the largest sphere that holds it."""
-    from scipy.spatial import cKDTree
-
     medial = radii > 0
     for other, within in _neighbours(grid):
         apart = grid.places[other] - grid.places
@@ -314,7 +308,7 @@ def _covering_radii(grid: _Grid, radii: Floats, outside: Booleans, centres: Floa
     all_centres = np.concatenate([grid.places[medial], centres])
     all_radii = np.concatenate([radii[medial], largest])
     places, sizes = grid.places[outside], radii[outside].copy()
-    tree: Any = cKDTree(places) if grid.period is None else cKDTree(places, boxsize=grid.period)
+    tree = tree_of(places, grid.period)
     # From the largest down: what is held by a larger sphere is held already.
     order = np.argsort(-all_radii)
     for first in range(0, len(order), _BALLS_AT_ONCE):

@@ -19,8 +19,7 @@ __all__ = ["FaceAreas", "WallThickness", "exact_areas", "fitted_areas", "wall_th
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Gauss points along each side of a patch: of what is integrated exactly, and of what is only counted, of which there are
-# to be so many in all.
+# Gauss points along each side of a patch: of what is integrated exactly, and of what is counted, so many in all.
 _QUADRATURE_POINTS = 16
 _FEWEST_MEASURED, _MOST_MEASURED, _MEASURED = 8, 48, 200_000
 # In mm to micrometres.
@@ -79,7 +78,9 @@ def wall_thickness(laid: LaidWall) -> WallThickness:
     walls, asked, weights = [], [], []
     for some, exact in laid_patches(laid.complex, grading, nodes, patches):
         chosen = patches[some]
-        faces = grid_derivatives(wall.nets[wall.patch_net[chosen]], wall.weights, (wall.knots, wall.knots), nodes, nodes)
+        faces = grid_derivatives(
+            wall.nets[wall.patch_net[chosen]], wall.weights, (wall.knots, wall.knots), nodes, nodes
+        )
         normal = exact.normals.reshape(*shape, 3)
         place = exact.points.reshape(*shape, 3) - wall.shifts[wall.patch_shift[chosen]][:, np.newaxis, np.newaxis]
         off = faces[0] - place[:, np.newaxis]

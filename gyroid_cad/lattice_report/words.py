@@ -37,6 +37,7 @@ LABELS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "cells": ("cells", ""),
         "cell_size": ("cell size", "mm"),
+        "thickness": ("thickness", "mm"),
         "scale_field": ("scale field", ""),
         "control_points": ("control points along a patch", ""),
         "density": ("density, volume fraction", ""),

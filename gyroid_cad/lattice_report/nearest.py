@@ -20,9 +20,11 @@ Booleans = NDArray[np.bool_]
 
 # Samples of all faces together, which take 250 bytes each.
 _MOST_SAMPLES = 800_000
-_FEWEST_STEPS, _MOST_STEPS = 6, 24
+_FEWEST_STEPS, _MOST_STEPS = 6, 48
 # So many queries and neighbours at a time that what is computed for them stays small.
 _PAIRS_AT_ONCE = 200_000
+# In steps between samples: the foot belongs to the nearest sample along each side, and a little is overlap.
+_OWN_FOOT = 0.6
 # A place lies in the wall only if it stands over its foot: beyond a free edge the foot is aside.
 _UPRIGHT = 0.9
 
@@ -41,12 +43,15 @@ class Feet:
         Whether the point is not behind the foot's face, in the wall.
     side : ndarray of int, shape (points, neighbours)
         Which face the foot is on, 0 or 1.
+    found : ndarray of bool, shape (points, neighbours)
+        Whether there is a foot next to the sample; else the sample itself stands for it.
     """
 
     away: Floats
     distance: Floats
     outside: Booleans
     side: Integers
+    found: Booleans
 
     def nearest(self) -> tuple[Floats, Booleans, Integers]:
         """Distance, whether outside the wall, and face of the nearest foot of each point."""
@@ -91,7 +96,7 @@ class WallFaces:
         """Feet on the faces of perpendiculars from places, one near each of the nearest samples.
 
         From the sample one step of Newton's method for the foot (The NURBS Book, eq. (6.6)), with the surface taken as
-        its quadratic there: so the distance is true to the fourth order of the samples' spacing.
+        its quadratic there: so the distance is true to the third order of the samples' spacing.
 
         Parameters
         ----------
@@ -102,10 +107,10 @@ class WallFaces:
         """
         size = max(1, _PAIRS_AT_ONCE // neighbours)
         parts = [self._feet(places[first : first + size], neighbours) for first in range(0, len(places), size)]
-        away, distance, outside, side = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return Feet(away, distance, outside, side)
+        away, distance, outside, side, found = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return Feet(away, distance, outside, side, found)
 
-    def _feet(self, places: Floats, neighbours: int) -> tuple[Floats, Floats, Booleans, Integers]:
+    def _feet(self, places: Floats, neighbours: int) -> tuple[Floats, Floats, Booleans, Integers, Booleans]:
         wrapped = places if self.period is None else np.mod(places, self.period)
         nearest = np.asarray(self.tree.query(wrapped, k=list(range(1, neighbours + 1)))[1])
         apart = wrapped[:, np.newaxis] - self.points[nearest]
@@ -115,17 +120,18 @@ class WallFaces:
         a, b, c = dot(du, du) - dot(apart, duu), dot(du, dv) - dot(apart, duv), dot(dv, dv) - dot(apart, dvv)
         along_u, along_v = dot(apart, du), dot(apart, dv)
         determinant = a * c - b * b
-        # Past the centre of curvature there is no foot nearby.
+        # Past the centre of curvature there is no foot nearby: the sample itself stands for it.
         sound = (determinant > 0) & (a > 0)
         determinant = np.where(sound, determinant, 1.0)
-        limit = self.step
-        u = np.where(sound, np.clip((c * along_u - b * along_v) / determinant, -limit, limit), 0.0)[..., np.newaxis]
-        v = np.where(sound, np.clip((a * along_v - b * along_u) / determinant, -limit, limit), 0.0)[..., np.newaxis]
+        u, v = (c * along_u - b * along_v) / determinant, (a * along_v - b * along_u) / determinant
+        # A foot further away is that of another sample, and known better from there.
+        sound &= np.maximum(np.abs(u), np.abs(v)) <= _OWN_FOOT * self.step
+        u, v = (np.where(sound, along, 0.0)[..., np.newaxis] for along in (u, v))
         away = apart - (du * u + dv * v + duu * (u * u / 2) + duv * (u * v) + dvv * (v * v / 2))
         normal = self.outwards[nearest]
         distance = np.linalg.norm(away, axis=-1)
         inside = dot(away, normal) < -_UPRIGHT * distance
-        return away, distance, ~inside, self.side[nearest]
+        return away, distance, ~inside, self.side[nearest], sound
 
 
 def wall_faces(wall: Wall, period: float | None) -> WallFaces:

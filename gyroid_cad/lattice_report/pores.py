@@ -33,9 +33,9 @@ Booleans = NDArray[np.bool_]
 
 # Places in all and along a cell: the grid that pore sizes are looked up on.
 _PLACES = 120_000
-_FEWEST_ALONG, _MOST_ALONG = 12, 32
+_FEWEST_ALONG, _MOST_ALONG = 11, 31
 # Samples looked at: of a place on the grid, and of a sphere's centre, which is as near to three walls or more.
-_NEIGHBOURS, _TOUCHING = 6, 48
+_NEIGHBOURS, _TOUCHING = 6, 200
 # Centres are moved until the radius they gain is this part of the grid's spacing; coarser where they are many.
 _SETTLED, _SETTLED_ENOUGH = 1e-6, 1e-3
 _MANY = 100
@@ -53,6 +53,8 @@ _BALLS_AT_ONCE = 256
 _NEIGHBOURING = np.array([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
 # How far beyond the block patches are fitted, in cell sizes: the largest pores reach less far.
 _BEYOND = 0.75
+# How far beyond the block the centres of spheres that reach into it are looked for, in cell sizes.
+_CENTRES_BEYOND = 0.3
 ENDLESS, CONTINUED, OPEN = "endless", "continued", "open"
 
 
@@ -112,6 +114,8 @@ class _Grid:
         In mm, of the part.
     volumes : ndarray, shape (n,)
         That each place stands for, in mm3.
+    inside : ndarray of bool, shape (n,)
+        Whether the place is in the block; beyond it there may be centres of spheres that reach into it.
     period : float, optional
     spacing : float
         At its widest.
@@ -120,6 +124,7 @@ class _Grid:
     shape: tuple[int, ...]
     places: Floats
     volumes: Floats
+    inside: Booleans
     period: float | None
     spacing: float
 
@@ -139,18 +144,18 @@ def pores_of(laid: LaidWall) -> Pores:
     -------
     Pores
     """
-    grid = _grid(laid)
-    faces, beyond = _faces(laid)
+    grid, faces, beyond = _scene(laid)
     radii, outside, sides = faces.feet(grid.places, _NEIGHBOURS).nearest()
     radii = np.where(outside, radii, 0.0)
+    pore = outside & grid.inside
     centres, largest, channel = _inscribed(faces, grid, radii, sides)
     return Pores(
         beyond=beyond,
-        porosity=float(grid.volumes[outside].sum() / grid.volumes.sum()),
+        porosity=float(grid.volumes[pore].sum() / grid.volumes[grid.inside].sum()),
         spacing=grid.spacing,
         channel_a=_spheres(largest[channel == 1]),
         channel_b=_spheres(largest[channel == 0]),
-        sizes=distribution_of(2 * _covering_radii(grid, radii, outside, centres, largest), grid.volumes[outside]),
+        sizes=distribution_of(2 * _covering_radii(grid, radii, pore, centres, largest), grid.volumes[pore]),
     )
 
 
@@ -166,21 +171,20 @@ def inscribed_spheres(laid: LaidWall) -> tuple[Floats, Floats, Integers]:
     channels : ndarray of int, shape (n,)
         1 for the labyrinth that the common normal points to, 0 for the other.
     """
-    grid = _grid(laid)
-    faces, _ = _faces(laid)
+    grid, faces, _ = _scene(laid)
     radii, outside, sides = faces.feet(grid.places, _NEIGHBOURS).nearest()
     return _inscribed(faces, grid, np.where(outside, radii, 0.0), sides)
 
 
-def _faces(laid: LaidWall) -> tuple[WallFaces, str]:
-    """What bounds the pores, and what there is beyond the block's sides."""
+def _scene(laid: LaidWall) -> tuple[_Grid, WallFaces, str]:
+    """Where to look, what bounds the pores, and what there is beyond the block's sides."""
     grading, wall = laid.recipe.grading, laid.wall
     if grading.uniform:
-        return wall_faces(wall, grading.cell_size), ENDLESS
+        return _grid(laid, 0.0), wall_faces(wall, grading.cell_size), ENDLESS
     try:
-        return wall_faces(_continued(laid), None), CONTINUED
+        return _grid(laid, _CENTRES_BEYOND), wall_faces(_continued(laid), None), CONTINUED
     except ParameterError:
-        return wall_faces(wall, None), OPEN
+        return _grid(laid, 0.0), wall_faces(wall, None), OPEN
 
 
 def _continued(laid: LaidWall) -> Wall:
@@ -205,21 +209,30 @@ def _continued(laid: LaidWall) -> Wall:
     return fitted_wall(complex, grading, len(laid.wall.weights))
 
 
-def _grid(laid: LaidWall) -> _Grid:
+def _grid(laid: LaidWall, margin: float) -> _Grid:
+    """A grid on the block, and so many cell sizes beyond its open sides."""
     grading, cells = laid.recipe.grading, laid.recipe.cells
     endless = grading.uniform
     counted = (1, 1, 1) if endless else cells
-    along = int(np.clip((_PLACES / np.prod(counted)) ** (1 / 3), _FEWEST_ALONG, _MOST_ALONG))
-    shape = tuple(along * count for count in counted)
-    axes = [(np.arange(count) + 0.5) / along * grading.cell_size for count in shape]
+    margins = np.where(grading.closed, 0.0, margin)
+    along = int(np.clip((_PLACES / np.prod(counted + 2 * margins)) ** (1 / 3), _FEWEST_ALONG, _MOST_ALONG))
+    # An odd number knows no symmetry of the lattice: else all pores that are alike would be miscounted alike.
+    along -= 1 - along % 2
+    extra = np.round(margins * along).astype(int).tolist()
+    axes = [
+        (np.arange(-more, along * count + more) + 0.5) / along * grading.cell_size
+        for count, more in zip(counted, extra, strict=True)
+    ]
+    shape = tuple(map(len, axes))
     own = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    inside = np.all((own > 0) & (own < np.array(counted) * grading.cell_size), axis=1)
     images, _, determinant = grading.carry(own)
     places = np.ascontiguousarray(images.T)
     size = grading.cell_size / along
     grid = places.reshape(*shape, 3)
     spacing = max(float(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max(initial=0.0)) for axis in range(3))
     volumes = np.broadcast_to(np.asarray(determinant) * size**3, len(places))
-    return _Grid(shape, places, volumes, grading.cell_size if endless else None, spacing)
+    return _Grid(shape, places, volumes, inside, grading.cell_size if endless else None, spacing)
 
 
 def _neighbours(grid: _Grid) -> Iterator[tuple[Integers, Booleans]]:
@@ -236,7 +249,7 @@ def _neighbours(grid: _Grid) -> Iterator[tuple[Integers, Booleans]]:
 
 def _inscribed(faces: WallFaces, grid: _Grid, radii: Floats, sides: Integers) -> tuple[Floats, Floats, Integers]:
     """Centres, radii and labyrinths of the largest spheres nearby."""
-    top = radii > 0
+    top = (radii > 0) & grid.inside
     for other, within in _neighbours(grid):
         # At the block's sides the next larger sphere may stand just outside.
         top &= within & (radii >= radii[other])
@@ -269,8 +282,11 @@ def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -
         feet = faces.feet(centres[moving], _TOUCHING)
         gains = np.zeros(len(moving))
         steps = np.zeros((len(moving), 3))
-        for row, (away, distance) in enumerate(zip(feet.away, feet.distance, strict=True)):
-            rows = np.column_stack([-away / distance[:, np.newaxis], np.ones(len(distance))])
+        for row in range(len(moving)):
+            nearest = int(np.argmin(feet.distance[row]))
+            met = np.flatnonzero(feet.found[row] | (np.arange(_TOUCHING) == nearest))
+            away, distance = feet.away[row, met], feet.distance[row, met]
+            rows = np.column_stack([-away / distance[:, np.newaxis], np.ones(len(met))])
             bounds = [(-reach[moving[row]], reach[moving[row]])] * 3 + [(None, None)]
             best: Any = linprog([0.0, 0.0, 0.0, -1.0], rows, distance, bounds=bounds)
             if best.status == 0:
@@ -297,7 +313,7 @@ def _distinct(centres: Floats, radii: Floats, apart: float, period: float | None
     return np.sort(order[kept])
 
 
-def _covering_radii(grid: _Grid, radii: Floats, outside: Booleans, centres: Floats, largest: Floats) -> Floats:
+def _covering_radii(grid: _Grid, radii: Floats, pore: Booleans, centres: Floats, largest: Floats) -> Floats:
     """At every place of the pores, the radius of the largest sphere that holds it."""
     medial = radii > 0
     for other, within in _neighbours(grid):
@@ -307,7 +323,7 @@ def _covering_radii(grid: _Grid, radii: Floats, outside: Booleans, centres: Floa
         medial &= ~(within & (radii[other] - radii >= _HELD * np.sqrt(dot(apart, apart))))
     all_centres = np.concatenate([grid.places[medial], centres])
     all_radii = np.concatenate([radii[medial], largest])
-    places, sizes = grid.places[outside], radii[outside].copy()
+    places, sizes = grid.places[pore], radii[pore].copy()
     tree = tree_of(places, grid.period)
     # From the largest down: what is held by a larger sphere is held already.
     order = np.argsort(-all_radii)

@@ -8,7 +8,7 @@ shows what it does not know as a table. Where there is nothing to say, the dict 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import prod
 from typing import Any
 
@@ -20,7 +20,7 @@ from gyroid_cad.lattice import Lattice
 from gyroid_cad.lattice_report.drawing import Facets
 from gyroid_cad.lattice_report.facets import facets_of_triangles, facets_of_wall
 from gyroid_cad.lattice_report.file_data import FileContents, file_section, read_contents
-from gyroid_cad.lattice_report.pores import pores_of
+from gyroid_cad.lattice_report.pores import ChannelSpheres, pores_of
 from gyroid_cad.lattice_report.wall_thickness import exact_areas, fitted_areas, wall_thickness
 from gyroid_cad.meshing import mesh_quality
 from gyroid_cad.stages import Progress, timed
@@ -287,17 +287,20 @@ def wall_section(subject: Subject) -> Values:
 def pores_section(subject: Subject) -> Values:
     """How large the pores are."""
     found = pores_of(subject.lattice.laid())
-    spheres = {name: getattr(found, name) for name in ("channel_a", "channel_b")}
     return {
         "beyond": found.beyond,
         "spacing": found.spacing,
         "porosity_counted": found.porosity,
-        **{
-            name: {NONE: "no sphere is largest inside"} if some is None else asdict(some)
-            for name, some in spheres.items()
-        },
+        "channel_a": _spheres(found.channel_a),
+        "channel_b": _spheres(found.channel_b),
         "sizes": found.sizes.as_dict(),
     }
+
+
+def _spheres(found: ChannelSpheres | None) -> Values:
+    if found is None:
+        return {NONE: "no sphere is largest inside"}
+    return {"count": found.count, "smallest_diameter": found.smallest, "largest_diameter": found.largest}
 
 
 def quality_section(subject: Subject) -> Values:

@@ -151,11 +151,13 @@ def _fragments(
     # Down the picture is the other way round. Of closed surfaces the back is never seen.
     facing = twice < 0 if closed else twice != 0
     seen = np.flatnonzero(facing & np.all(extent > 0, axis=1))
-    # Triangles whose boxes are about as large go together.
-    classes = np.ceil(np.log2(np.maximum(extent[seen], 1))).astype(np.int64)
-    for kind in np.unique(classes, axis=0).tolist():
-        columns, rows = 2 ** kind[0], 2 ** kind[1]
-        members = seen[np.all(classes == kind, axis=1)]
+    # Triangles whose boxes are about as large, to an eighth, go together.
+    unit = 2 ** np.maximum(np.floor(np.log2(np.maximum(extent[seen], 1))).astype(np.int64) - 3, 0)
+    boxes = -(-extent[seen] // unit) * unit
+    kinds, which_kind = np.unique(boxes, axis=0, return_inverse=True)
+    in_order = seen[np.argsort(which_kind.ravel(), kind="stable")]
+    ends = np.cumsum(np.bincount(which_kind.ravel(), minlength=len(kinds)))
+    for (columns, rows), members in zip(kinds.tolist(), np.split(in_order, ends[:-1]), strict=True):
         step = max(1, _FRAGMENTS_AT_ONCE // (columns * rows))
         for first in range(0, len(members), step):
             some = members[first : first + step]

@@ -21,6 +21,8 @@ COLOURS = ((0.93, 0.71, 0.33), (0.36, 0.58, 0.80), (0.97, 0.90, 0.75))
 # Squares along each side of a patch: fewer where there are many.
 _MOST_SQUARES, _FEWEST_SQUARES = 10, 3
 _MOST_TRIANGLES = 600_000
+# Places through the wall, on the side walls.
+_THROUGH = np.linspace(0.0, 1.0, 5)[np.newaxis]
 
 
 def facets_of_wall(wall: Wall) -> Facets:
@@ -58,7 +60,7 @@ def _side_walls(wall: Wall, samples: Floats) -> tuple[Floats, Floats, Floats]:
     kinds, which = np.unique(np.stack([wall.patch_net[patches], edges]), axis=1, return_inverse=True)
     made = []
     for net, edge in kinds.T.tolist():
-        both = wall.side_wall(net, edge).derivatives(samples[:, np.newaxis], np.array([[0.0, 1.0]]))
+        both = wall.side_wall(net, edge).derivatives(samples[:, np.newaxis], _THROUGH)
         made.append((both[0, 0], np.cross(both[1, 0], both[0, 1])))
     if not made:
         return np.empty((0, 3, 3)), np.empty((0, 3, 3)), np.empty((0, 3))

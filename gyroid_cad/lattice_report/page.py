@@ -44,7 +44,7 @@ _IN_WORDS = {"tenth": "10 % below", "ninetieth": "90 % below"}
 _FACTS = (
     ("measures", "density", "density"),
     ("measures", "wall_thickness", "wall"),
-    ("pores", "sizes.median", "pore size, median"),
+    ("pores", "sizes.median", "median pore"),
     ("pores", "sizes.largest", "largest pore"),
     ("measures", "volume", "volume"),
     ("measures", "area_per_volume", "area / volume"),
@@ -55,7 +55,7 @@ _FACTS = (
 )
 # In the order of their colours.
 _FACES = ("face B", "face A", "rim")
-_FACT_UNITS = {"pore size, median": "mm", "largest pore": "mm"}
+_FACT_UNITS = {"median pore": "mm", "largest pore": "mm"}
 
 
 def require_page(path: str | os.PathLike[str]) -> Path:
@@ -165,11 +165,11 @@ def _table(values: Values, key: str) -> str:
         where = f"{key}.{name}"
         if isinstance(value, Mapping):
             below.append(
-                f"<h3>{escape(label.capitalize())}</h3>"
+                f"<h3>{escape(label[:1].upper() + label[1:])}</h3>"
                 + (f"<p>None: {escape(str(value[NONE]))}.</p>" if NONE in value else _table(value, where))
             )
         elif isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
-            below.append(f"<h3>{escape(label.capitalize())}</h3>{_rows(value, where)}")
+            below.append(f"<h3>{escape(label[:1].upper() + label[1:])}</h3>{_rows(value, where)}")
         elif not (isinstance(value, list) and len(value) > _SIGNIFICANT):
             rows.append(f"<tr><th>{escape(label)}</th><td>{_shown(value, where)} {escape(unit)}</td></tr>")
     table = f'<table class="facts-table"><tbody>{"".join(rows)}</tbody></table>' if rows else ""
@@ -193,7 +193,7 @@ def _wall(values: Values, key: str) -> str:
     varies = thickness["largest"] - thickness["smallest"] > 1e-2 * thickness["mean"]
     parts = [
         _distribution("Thickness", thickness, f"{key}.thickness", "mm", chart=varies),
-        _distribution("Less the thickness asked for", error, f"{key}.error", "µm"),
+        _distribution("Error: measured less asked for", error, f"{key}.error", "µm"),
     ]
     return f'<div class="columns">{"".join(parts)}</div>'
 
@@ -231,7 +231,8 @@ def _quality(values: Values, key: str) -> str:
         for measure, summary in values["measures"].items()
     )
     table = f'<div class="scroll"><table><thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-    return f"{_jacobians(values['measures']['scaled_jacobian'])}{table}{_table(rest, key)}"
+    chart = _jacobians(values["measures"]["scaled_jacobian"])
+    return f'<div class="columns"><div>{chart}</div><div>{_table(rest, key)}</div></div>{table}'
 
 
 def _jacobians(summary: Values) -> str:

@@ -9,7 +9,7 @@ distribution of Gelb and Gubbins (Langmuir 15, 1999, 305-308), the one that poro
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gyroid_cad.arrays import dot
 from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields import Field
 from gyroid_cad.lattice_report.distributions import Distribution, distribution_of
 from gyroid_cad.lattice_report.nearest import WallFaces, tree_of, wall_faces
 from gyroid_cad.laying import LaidWall
@@ -53,6 +54,8 @@ _BALLS_AT_ONCE = 256
 _NEIGHBOURING = np.array([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
 # How far beyond the block patches are fitted, in cell sizes: the largest pores reach less far.
 _BEYOND = 0.75
+# How far beyond the block its own patches reach.
+_REACH = 0.25
 # How far beyond the block the centres of spheres that reach into it are looked for, in cell sizes.
 _CENTRES_BEYOND = 0.3
 ENDLESS, CONTINUED, OPEN = "endless", "continued", "open"
@@ -83,7 +86,7 @@ class Pores:
     ----------
     beyond : {"endless", "continued", "open"}
         Whether this is one cell of an endless lattice, or the block of one that varies and is taken to go on a cell
-        beyond its sides, or where it cannot, because a field or the map ends there, the block with open sides.
+        beyond its sides, or where it cannot, because the scale field or the map ends there, the block with open sides.
     porosity : float
         Part of the block that is pore, by counting places; the exact one is 1 less the density.
     spacing : float
@@ -190,10 +193,13 @@ def _scene(laid: LaidWall) -> tuple[_Grid, WallFaces, str]:
 def _continued(laid: LaidWall) -> Wall:
     """The wall of a lattice that varies, with the patches that would come next beyond the block's open sides.
 
+    Thickness and density stay there what they are where the lattice ends: a wall that thins out along it may be gone
+    beyond.
+
     Raises
     ------
     ParameterError
-        If a field or the map is no good there.
+        If the scale field or the map is no good there.
     """
     recipe, grading = laid.recipe, laid.recipe.grading
     closed, cells, placements = np.array(grading.closed), np.array(recipe.cells), grading.surface.cell
@@ -206,7 +212,21 @@ def _continued(laid: LaidWall) -> Wall:
     nx, ny, nz = (cells + 2 * ~closed).tolist()
     x, y, z = (-1 * ~closed).tolist()
     complex = build_complex((nx, ny, nz), placements, grading.closed, first=(x, y, z), wanted=near)
-    return fitted_wall(complex, grading, len(laid.wall.weights))
+    ends = (-_REACH * grading.cell_size, (cells + _REACH) * grading.cell_size)
+    held = replace(grading, thickness=_held(grading.thickness, *ends), density=_held(grading.density, *ends))
+    return fitted_wall(complex, held, len(laid.wall.weights))
+
+
+def _held(value: float | Field | None, low: float, high: Floats) -> float | Field | None:
+    """A field that beyond a box is what it is on the box."""
+    if not isinstance(value, Field):
+        return value
+    field = value
+
+    def held(x: Floats, y: Floats, z: Floats) -> Floats:
+        return field(*(np.clip(along, low, end) for along, end in zip((x, y, z), high, strict=True)))
+
+    return Field(held, field.text, parameter=field.parameter)
 
 
 def _grid(laid: LaidWall, margin: float) -> _Grid:

@@ -23,13 +23,14 @@ section { margin-top: 28px; background: var(--card); border: 1px solid var(--lin
 .fact b { display: block; font-size: 21px; font-weight: 600; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .fact span { color: var(--faint); font-size: 13px; }
 .views { display: grid; grid-template-columns: repeat(6, 1fr); gap: 8px 20px; }
-figure { margin: 0; grid-column: span 2; text-align: center; }
+figure { margin: 0; grid-column: span 2; text-align: center; align-self: end; }
 figure:first-child { grid-column: span 6; }
 figure img { max-width: 100%; height: auto; max-height: 340px; }
 figure:first-child img { max-height: 520px; }
 figcaption { color: var(--faint); font-size: 13px; }
 .key { display: inline-block; width: 11px; height: 11px; border-radius: 3px; margin: 0 4px 0 12px; vertical-align: -1px;
   border: 1px solid var(--line); }
+.key:first-child { margin-left: 0; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 6px 18px 6px 0; border-bottom: 1px solid var(--line); vertical-align: top; }
@@ -41,7 +42,7 @@ td { overflow-wrap: anywhere; }
 td.number, th.number { text-align: right; padding-right: 4px; padding-left: 14px; white-space: nowrap; }
 .yes { color: var(--good); } .no { color: var(--bad); }
 .columns { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr)); gap: 8px 36px; }
-.chart { width: 100%; height: auto; display: block; margin: 6px 0 2px; }
+.chart { width: 100%; max-width: 640px; height: auto; display: block; margin: 6px 0 2px; }
 .chart .bar { fill: var(--bar); } .chart .grid { stroke: var(--line); } .chart .axis { stroke: var(--faint); }
 .chart .mark { stroke: var(--accent); stroke-width: 1.5; stroke-dasharray: 5 4; }
 .chart .tick { fill: var(--faint); font-size: 12px; font-family: inherit; }

@@ -76,6 +76,8 @@ LABELS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "channel_a": ("labyrinth A", ""),
         "channel_b": ("labyrinth B", ""),
         "count": ("inscribed spheres", ""),
+        "smallest_diameter": ("smallest diameter", "mm"),
+        "largest_diameter": ("largest diameter", "mm"),
         "open_edges": ("open edges", ""),
         "format": ("format", ""),
         "bytes": ("size", "bytes"),

@@ -26,7 +26,9 @@ FIT = {"gyroid": 2e-5, "diamond": 5e-7, "primitive": 2e-5}
 
 
 @lru_cache
-def spheres(surface: str = "gyroid", wall: float = WALL, size: float = SIZE) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def spheres(
+    surface: str = "gyroid", wall: float = WALL, size: float = SIZE
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
     return inscribed_spheres(Lattice((1, 1, 1), size, wall, surface=surface).laid())
 
 
@@ -143,8 +145,16 @@ def test_a_field_that_does_not_vary_leaves_the_pores_as_they_are(gyroid: Pores) 
     assert found.sizes.mean == pytest.approx(gyroid.sizes.mean, rel=0.02)
 
 
-def test_where_a_field_ends_with_the_lattice_its_sides_are_open() -> None:
-    lattice = Lattice((1, 1, 1), SIZE, lambda x, y, z: np.where(z < 13.5, 0.8, -1.0), fit=FitSettings(8))
+def test_a_wall_that_would_be_gone_beyond_the_lattice_stays_as_it_ends(gyroid: Pores) -> None:
+    lattice = Lattice((1, 1, 1), SIZE, lambda x, y, z: np.where(z < 13.5, WALL, -1.0), fit=FitSettings(8))
+    found = pores_of(lattice.laid())
+    assert found.beyond == "continued"
+    assert found.sizes.largest == pytest.approx(gyroid.sizes.largest, rel=2e-3)
+
+
+def test_where_a_map_ends_near_the_lattice_its_sides_are_open() -> None:
+    # Half a cell beneath the block the cylinder has no radius left.
+    lattice = Lattice((1, 1, 1), SIZE, WALL, map="cylinder:radius=6", fit=FitSettings(8))
     assert pores_of(lattice.laid()).beyond == "open"
 
 

@@ -17,7 +17,9 @@ FACETS = np.array([t for a, b, c, d in SIDES for t in ((a, b, c), (a, c, d))])
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, ) -> Path:
+def folder(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
     made = tmp_path_factory.mktemp("triangles")
     Lattice((1, 1, 1), 10.0, 0.8).write(made / "a.stl", made / "a.3mf", deviation=0.05)
     return made

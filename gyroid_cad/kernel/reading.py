@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 # Of triangles to look at, in parts of the largest extent; and between them, in degrees.
 _SHOWN_DEVIATION = 1e-3
 _SHOWN_ANGLE = 20.0
+# What the first lines of a BREP file say, and how many bytes these take at most.
+_BREP_MARK, _BREP_HEADER = b"CASCADE Topology V", 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,10 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
     if Path(path).suffix.lower() != ".brep":
         return read_step(path)
     shape = TopoDS_Shape()
-    if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
+    # Of text that is something else the kernel complains on standard output.
+    with Path(path).open("rb") as file:
+        known = _BREP_MARK in file.read(_BREP_HEADER)
+    if not known or not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ExportError(f"{path} could not be read as BREP")
     return shape
 

@@ -19,6 +19,7 @@ from gyroid_cad.patch import PARAMETERISATIONS
 from gyroid_cad.symmetry import QUARTER
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 SIZE, WALL = 10.0, 0.8
 # The fitted faces' deviation, in cell sizes.
@@ -145,6 +146,13 @@ def test_a_field_that_does_not_vary_leaves_the_pores_as_they_are(gyroid: Pores) 
     assert found.sizes.mean == pytest.approx(gyroid.sizes.mean, rel=0.02)
 
 
+@pytest.fixture
+def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Enough for the inscribed spheres, which are moved to where they are largest."""
+    monkeypatch.setattr("gyroid_cad.lattice_report.pores._PLACES", 12_000)
+
+
+@pytest.mark.usefixtures("few_places")
 def test_a_wall_that_would_be_gone_beyond_the_lattice_stays_as_it_ends(gyroid: Pores) -> None:
     lattice = Lattice((1, 1, 1), SIZE, lambda x, y, z: np.where(z < 13.5, WALL, -1.0), fit=FitSettings(8))
     found = pores_of(lattice.laid())
@@ -152,6 +160,7 @@ def test_a_wall_that_would_be_gone_beyond_the_lattice_stays_as_it_ends(gyroid: P
     assert found.sizes.largest == pytest.approx(gyroid.sizes.largest, rel=2e-3)
 
 
+@pytest.mark.usefixtures("few_places")
 def test_where_a_map_ends_near_the_lattice_its_sides_are_open() -> None:
     # Half a cell beneath the block the cylinder has no radius left.
     lattice = Lattice((1, 1, 1), SIZE, WALL, map="cylinder:radius=6", fit=FitSettings(8))

@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import subprocess
+from collections.abc import Iterator
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
@@ -28,6 +29,30 @@ Captured = pytest.CaptureFixture[str]
 CELL = ["--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "0.8"]
 # Attributes whose value a browser fetches, or goes to.
 ADDRESSES = {"src", "href", "srcset", "data", "action", "poster", "xlink:href"}
+# Of a page without pictures and charts.
+PLAIN_TAGS = [
+    "html",
+    "head",
+    "meta",
+    "link",
+    "title",
+    "style",
+    "body",
+    "main",
+    "header",
+    "h1",
+    "p",
+    "section",
+    "h2",
+    "h3",
+    "table",
+    "tbody",
+    "tr",
+    "th",
+    "td",
+    "data",
+    "footer",
+]
 
 
 class Page(HTMLParser):
@@ -49,8 +74,18 @@ class Page(HTMLParser):
         self.addresses += [str(value) for name, value in attrs if name in ADDRESSES]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def small() -> Iterator[None]:
+    """Small pictures and few places: both are looked at in tests of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gyroid_cad.lattice_report.page._LARGE", 120)
+        patch.setattr("gyroid_cad.lattice_report.page._SMALL", 80)
+        patch.setattr("gyroid_cad.lattice_report.pores._PLACES", 4000)
+        yield
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
+def made(tmp_path_factory: pytest.TempPathFactory, small: None) -> SimpleNamespace:
     """One run of the command: the page and the JSON."""
     folder = tmp_path_factory.mktemp("report")
     page = folder / "a.html"
@@ -108,13 +143,10 @@ def test_the_page_holds_all_it_shows_and_runs_nothing(made: SimpleNamespace) -> 
 
 def test_what_a_user_wrote_is_text_on_the_page() -> None:
     nasty = "<script>alert(\"x\")</script> & 'more'"
-    report = Report(
-        nasty, "lattice", {"parameters": {"thickness": nasty, nasty: 1.0, "map": {"none": nasty}}}, None, {}
-    )
-    page = page_of(report)
+    values = {"thickness": nasty, nasty: 1.0, "map": {"none": nasty}}
+    page = page_of(Report(nasty, "lattice", {"parameters": values}, None, {}))
     assert "<script" not in page
-    assert set(Page(page).tags) <= {"html", "head", "meta", "link", "title", "style", "body", "main", "header", "h1",
-                                    "p", "section", "h2", "h3", "table", "tbody", "tr", "th", "td", "data", "footer"}  # fmt: skip
+    assert set(Page(page).tags) == {*PLAIN_TAGS}
 
 
 def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,13 +166,12 @@ def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytes
     assert report.as_dict()["print_check"]["layers"] == 3
 
 
-def test_a_lattice_that_varies_and_one_that_is_cut_are_reported_on(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Pores are looked at in their own tests.
-    monkeypatch.setattr("gyroid_cad.lattice_report.pores._PLACES", 2000)
+def test_a_lattice_that_varies_and_one_that_is_cut_are_reported_on(capsys: Captured, tmp_path: Path) -> None:
     varying = ["--cells", "1", "1", "1", "--cell-size", "10", "--density", "0.2 + 0.01*x", "--tolerance", "1e-3"]
-    for options, key in ((varying, "fit.max_wall_error"), ([*CELL, "--trim", "box"], "measures.valid")):
+    for options, key in (
+        (varying, "fit.max_wall_error"),
+        ([*CELL, "--trim", "box", "--control-points", "6"], "measures.valid"),
+    ):
         capsys.readouterr()
         assert main(["report", "-o", str(tmp_path / "a.html"), *options, "--subdivisions", "2", "--json"]) == 0
         numbers = Page((tmp_path / "a.html").read_text(encoding="utf-8")).numbers
@@ -213,8 +244,10 @@ def test_a_page_that_cannot_be_drawn_leaves_the_old_one(tmp_path: Path, monkeypa
 
 # Written into a copy of the page: what the browser fetched for it, and whether every picture came out.
 PROBE = """<script>addEventListener("load", () => { document.title = "probe " + JSON.stringify({
-  fetched: performance.getEntriesByType("resource").map(entry => entry.name).filter(name => !name.startsWith("data:")),
-  drawn: [...document.images].filter(image => image.complete && image.naturalWidth > 0).length }); });</script></body>"""
+  fetched: performance.getEntriesByType("resource")
+    .map(entry => entry.name).filter(name => !name.startsWith("data:")),
+  drawn: [...document.images].filter(image => image.complete && image.naturalWidth > 0).length });
+  });</script></body>"""
 
 
 def in_chromium(page: Path, folder: Path) -> tuple[dict[str, Any], list[str]]:

@@ -54,7 +54,8 @@ def test_a_3mf_s_units_and_placements_are_those_of_what_is_built(folder: Path, t
     meshes = model.GetMeshObjects()
     meshes.MoveNext()
     model.AddBuildItem(meshes.GetCurrentMeshObject(), wrapper.GetTranslationTransform(100, 0, 0))
-    model.QueryWriter("3mf").WriteToFile(str(tmp_path / "inches.3mf"))
+    # To a file the library writes in a locale of its own, and leaves the process in it.
+    (tmp_path / "inches.3mf").write_bytes(bytes(model.QueryWriter("3mf").WriteToBuffer()))
     one, read = (triangle_measures(read_triangles(path)) for path in (folder / "a.3mf", tmp_path / "inches.3mf"))
     assert read.pieces == 2
     assert read_triangles(tmp_path / "inches.3mf").objects == 2
@@ -70,7 +71,7 @@ def test_a_cube_without_a_triangle_has_three_open_edges_and_no_inside() -> None:
 
 
 def test_cubes_that_share_an_edge_close_but_are_no_manifold() -> None:
-    other = CUBE + [2.0, 2.0, 0.0]
+    other = CUBE + np.array([2.0, 2.0, 0.0])
     vertices, numbers = np.unique(np.concatenate([CUBE, other]), axis=0, return_inverse=True)
     found = triangle_measures(ReadTriangles(vertices, numbers.ravel()[np.concatenate([FACETS, FACETS + 8])], 1))
     assert (found.closed, found.manifold, found.open_edges, found.pieces) == (True, False, 0, 1)

@@ -25,7 +25,13 @@ _COMMON = {"config", "output", "as_json", "quiet", "help"}
 
 
 @click.command("report")
-@click.option("-o", "--output", metavar="FILE.html", help="One page that needs nothing else: opens offline.")
+@click.option(
+    "-o",
+    "--output",
+    multiple=True,
+    metavar="FILE.html",
+    help="One page that needs nothing else and opens offline.",
+)
 @lattice_options
 @click.option(
     "--subdivisions",
@@ -37,7 +43,7 @@ _COMMON = {"config", "output", "as_json", "quiet", "help"}
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--quiet", is_flag=True, help="Print nothing and no progress.")
-def report_command(output: str | None, subdivisions: int, as_json: bool, quiet: bool, **given: Any) -> None:
+def report_command(output: tuple[str, ...], subdivisions: int, as_json: bool, quiet: bool, **given: Any) -> None:
     """Report on a lattice, or on a STEP, BREP, STL or 3MF file.
 
     Of a lattice, described as for "build" by options or in a TOML file: pictures, wall thickness, pore sizes, density,
@@ -52,18 +58,20 @@ def report_command(output: str | None, subdivisions: int, as_json: bool, quiet: 
     start = time.perf_counter()
     from gyroid_cad.lattice_report.page import require_page, write_page
 
-    if output is None and not as_json:
+    if not output and not as_json:
         raise click.UsageError("Missing option '-o' / '--output', or --json.")
-    if output is not None:
-        require_page(output)
+    if len(output) > 1:
+        raise ParameterError("output", list(output), "one file")
+    for page in output:
+        require_page(page)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         report = _report(given, subdivisions, progress)
-        if output is not None:
-            write_page(report, output)
+        for page in output:
+            write_page(report, page)
     if as_json:
         click.echo(json.dumps(report.as_dict()))
-    elif not quiet and output is not None:
-        _print(report, output, time.perf_counter() - start)
+    elif not quiet:
+        _print(report, output[0], time.perf_counter() - start)
 
 
 def _report(given: dict[str, Any], subdivisions: int, progress: Progress | None) -> Report:

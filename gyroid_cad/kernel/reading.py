@@ -66,8 +66,11 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
         return read_step(path)
     shape = TopoDS_Shape()
     # Of text that is something else the kernel complains on standard output.
-    with Path(path).open("rb") as file:
-        known = _BREP_MARK in file.read(_BREP_HEADER)
+    try:
+        with Path(path).open("rb") as file:
+            known = _BREP_MARK in file.read(_BREP_HEADER)
+    except OSError as problem:
+        raise ExportError(f"{path} could not be read: {problem.strerror}") from None
     if not known or not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ExportError(f"{path} could not be read as BREP")
     return shape

@@ -208,6 +208,7 @@ def test_a_file_of_a_part_is_told_by_its_size_its_faces_or_triangles_and_whether
         ([*CELL], "Missing option '-o'"),
         ([*CELL, "-o", "a.pdf"], "ending in .html"),
         ([*CELL, "-o", "nowhere/a.html"], "existing folder"),
+        ([*CELL, "-o", "a.html", "-o", "b.html"], "one file"),
         ([*CELL, "-o", "a.html", "--subdivisions", "0"], "--subdivisions = 0"),
         ([*CELL, "-o", "a.html", "--density", "0.3"], "exactly one of --thickness and --density"),
         (["-o", "a.html", "--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "9"], "curvature limit"),

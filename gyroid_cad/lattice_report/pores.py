@@ -20,7 +20,7 @@ from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields import Field
 from gyroid_cad.lattice_report.distributions import Distribution, distribution_of
-from gyroid_cad.lattice_report.nearest import WallFaces, tree_of, wall_faces
+from gyroid_cad.lattice_report.nearest import Feet, WallFaces, tree_of, wall_faces
 from gyroid_cad.laying import LaidWall
 from gyroid_cad.refit import fitted_wall
 from gyroid_cad.symmetry import CELL_QUARTERS
@@ -292,28 +292,15 @@ def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -
     direction: a linear programme says where all of them grow most, within a step that gets shorter where it promised
     too much (sequential linear programming).
     """
-    from scipy.optimize import linprog
-
     centres, radii = centres.copy(), radii.copy()
     reach = np.full(len(centres), spacing / 2)
     moving = np.arange(len(centres))
     least = spacing * (_SETTLED if len(centres) <= _MANY else _SETTLED_ENOUGH)
     for _ in range(_MOST_MOVES):
-        feet = faces.feet(centres[moving], _TOUCHING)
-        gains = np.zeros(len(moving))
-        steps = np.zeros((len(moving), 3))
-        for row in range(len(moving)):
-            nearest = int(np.argmin(feet.distance[row]))
-            met = np.flatnonzero(feet.found[row] | (np.arange(_TOUCHING) == nearest))
-            away, distance = feet.away[row, met], feet.distance[row, met]
-            rows = np.column_stack([-away / distance[:, np.newaxis], np.ones(len(met))])
-            bounds = [(-reach[moving[row]], reach[moving[row]])] * 3 + [(None, None)]
-            best: Any = linprog([0.0, 0.0, 0.0, -1.0], rows, distance, bounds=bounds)
-            if best.status == 0:
-                steps[row], gains[row] = best.x[:3], best.x[3] - distance.min()
+        steps, gains = _best_steps(faces.feet(centres[moving], _TOUCHING), reach[moving])
         tried, outside, _ = faces.feet(centres[moving] + steps, _TOUCHING).nearest()
         better = outside & (tried > radii[moving])
-        promised = np.where(better, (tried - radii[moving]) >= _KEPT_PROMISE * gains, False)
+        promised = better & (tried - radii[moving] >= _KEPT_PROMISE * gains)
         centres[moving[better]] += steps[better]
         radii[moving[better]] = tried[better]
         reach[moving[~promised]] /= 4
@@ -321,6 +308,33 @@ def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -
         if not len(moving):
             break
     return centres, radii
+
+
+def _best_steps(feet: Feet, reach: Floats) -> tuple[Floats, Floats]:
+    """Steps, each coordinate within reach, that let the least distance to the feet grow most, and by how much.
+
+    The programmes of all centres are solved as one: nothing joins them but that their gains are added.
+    """
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_array
+
+    count = len(feet.distance)
+    nearest = np.arange(_TOUCHING) == np.argmin(feet.distance, axis=1)[:, np.newaxis]
+    which, foot = np.nonzero(feet.found | nearest)
+    distance = feet.distance[which, foot]
+    # r - (away / distance) . step <= distance, in the unknowns x, y, z and r of each centre.
+    values = np.column_stack([-feet.away[which, foot] / distance[:, np.newaxis], np.ones(len(which))])
+    columns = 4 * which[:, np.newaxis] + np.arange(4)
+    rows = csr_array((values.ravel(), columns.ravel(), 4 * np.arange(len(which) + 1)), shape=(len(which), 4 * count))
+    bounds = np.repeat(np.column_stack([-reach, reach]), 4, axis=0)
+    bounds[3::4] = [-np.inf, np.inf]
+    gain = np.tile([0.0, 0.0, 0.0, -1.0], count)
+    # SciPy takes sparse rows, which its stubs do not know.
+    best: Any = linprog(gain, rows, distance, bounds=bounds)  # type: ignore[call-overload]
+    if best.status != 0:
+        return np.zeros((count, 3)), np.zeros(count)
+    found = best.x.reshape(count, 4)
+    return found[:, :3], found[:, 3] - feet.distance.min(axis=1)
 
 
 def _distinct(centres: Floats, radii: Floats, apart: float, period: float | None) -> Integers:

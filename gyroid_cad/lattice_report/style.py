@@ -20,7 +20,7 @@ section { margin-top: 28px; background: var(--card); border: 1px solid var(--lin
 .note { color: var(--faint); margin: 0 0 12px; max-width: 78ch; }
 .facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 12px; margin-top: 24px; }
 .fact { background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 12px 16px; }
-.fact b { display: block; font-size: 21px; font-weight: 600; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.fact b { display: block; font-size: 21px; font-weight: 600; font-variant-numeric: tabular-nums; }
 .fact span { color: var(--faint); font-size: 13px; }
 .views { display: grid; grid-template-columns: repeat(6, 1fr); gap: 8px 20px; }
 figure { margin: 0; grid-column: span 2; text-align: center; align-self: end; }

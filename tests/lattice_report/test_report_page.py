@@ -30,29 +30,8 @@ CELL = ["--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "0.8"]
 # Attributes whose value a browser fetches, or goes to.
 ADDRESSES = {"src", "href", "srcset", "data", "action", "poster", "xlink:href"}
 # Of a page without pictures and charts.
-PLAIN_TAGS = [
-    "html",
-    "head",
-    "meta",
-    "link",
-    "title",
-    "style",
-    "body",
-    "main",
-    "header",
-    "h1",
-    "p",
-    "section",
-    "h2",
-    "h3",
-    "table",
-    "tbody",
-    "tr",
-    "th",
-    "td",
-    "data",
-    "footer",
-]
+FRAME_TAGS = {"html", "head", "meta", "link", "title", "style", "body", "main", "header", "footer", "section"}
+PLAIN_TAGS = FRAME_TAGS | {"h1", "h2", "h3", "p", "table", "tbody", "tr", "th", "td", "data"}
 
 
 class Page(HTMLParser):
@@ -146,7 +125,7 @@ def test_what_a_user_wrote_is_text_on_the_page() -> None:
     values = {"thickness": nasty, nasty: 1.0, "map": {"none": nasty}}
     page = page_of(Report(nasty, "lattice", {"parameters": values}, None, {}))
     assert "<script" not in page
-    assert set(Page(page).tags) == {*PLAIN_TAGS}
+    assert set(Page(page).tags) == PLAIN_TAGS
 
 
 def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,14 +147,20 @@ def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytes
 
 def test_a_lattice_that_varies_and_one_that_is_cut_are_reported_on(capsys: Captured, tmp_path: Path) -> None:
     varying = ["--cells", "1", "1", "1", "--cell-size", "10", "--density", "0.2 + 0.01*x", "--tolerance", "1e-3"]
-    for options, key in (
-        (varying, "fit.max_wall_error"),
-        ([*CELL, "--trim", "box", "--control-points", "6"], "measures.valid"),
-    ):
+    cut = [*CELL, "--trim", "box", "--control-points", "6"]
+    for options, key in ((varying, "fit.max_wall_error"), (cut, "measures.valid")):
         capsys.readouterr()
         assert main(["report", "-o", str(tmp_path / "a.html"), *options, "--subdivisions", "2", "--json"]) == 0
         numbers = Page((tmp_path / "a.html").read_text(encoding="utf-8")).numbers
         assert json.loads(numbers[key]) == looked_up(json.loads(capsys.readouterr().out), key)
+
+
+def test_a_lattice_and_its_page_may_stand_in_a_file(capsys: Captured, tmp_path: Path) -> None:
+    page, lattice = tmp_path / "a.html", tmp_path / "lattice.toml"
+    lattice.write_text(f'output = "{page}"\ncells = [1, 1, 1]\ncell_size = 10\nthickness = 0.8\nsubdivisions = 2\n')
+    assert main(["report", str(lattice)]) == 0
+    assert str(page) in capsys.readouterr().out
+    assert Page(page.read_text(encoding="utf-8")).numbers["quality.subdivisions"] == "2"
 
 
 @pytest.mark.parametrize("ending", ["step", "brep", "stl", "3mf"])

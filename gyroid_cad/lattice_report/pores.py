@@ -51,6 +51,8 @@ _SAME = 0.5
 # sliver.
 _HELD = 0.85
 _BALLS_AT_ONCE = 256
+# How far from the wall, in spacings, spheres round places of the grid may leave a place to itself.
+_LAYER = 0.5
 _NEIGHBOURING = np.array([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
 # How far beyond the block patches are fitted, in cell sizes: the largest pores reach less far.
 _BEYOND = 0.75
@@ -367,6 +369,11 @@ def _covering_radii(grid: _Grid, radii: Floats, pore: Booleans, centres: Floats,
         counts = [len(places_held) for places_held in held]
         flat = np.concatenate([np.asarray(places_held, dtype=np.int64) for places_held in held])
         np.maximum.at(sizes, flat, np.repeat(all_radii[some], counts))
+    # Spheres round places of a grid leave a thin layer on the wall: what holds the next place holds it too.
+    layer = (sizes <= radii[pore]) & (sizes < _LAYER * grid.spacing)
+    if layer.any() and not layer.all():
+        neighbour = tree_of(places[~layer], grid.period).query(places[layer])[1]
+        sizes[layer] = np.maximum(sizes[layer], sizes[~layer][neighbour])
     return sizes
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,8 @@ from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields import Field
 from gyroid_cad.lattice_report.distributions import Distribution, distribution_of
-from gyroid_cad.lattice_report.nearest import Feet, WallFaces, tree_of, wall_faces
+from gyroid_cad.lattice_report.inscribed import distinct, settled
+from gyroid_cad.lattice_report.nearest import WallFaces, tree_of, wall_faces
 from gyroid_cad.laying import LaidWall
 from gyroid_cad.refit import fitted_wall
 from gyroid_cad.symmetry import CELL_QUARTERS
@@ -35,14 +35,8 @@ Booleans = NDArray[np.bool_]
 # Places in all and along a cell: the grid that pore sizes are looked up on.
 _PLACES = 120_000
 _FEWEST_ALONG, _MOST_ALONG = 11, 31
-# Samples looked at: of a place on the grid, and of a sphere's centre, which is as near to three walls or more.
-_NEIGHBOURS, _TOUCHING = 6, 200
-# Centres are moved until the radius they gain is this part of the grid's spacing; coarser where they are many.
-_SETTLED, _SETTLED_ENOUGH = 1e-6, 1e-3
-_MANY = 100
-_MOST_MOVES = 40
-# One step of the linear programme must give this part of what it promises, or the next is to be shorter.
-_KEPT_PROMISE = 0.25
+# Samples looked at round a place.
+_NEIGHBOURS = 6
 # In spacings: places that are next to each other, across the cube's diagonal too.
 _BESIDE = 1.75
 # Inscribed spheres whose centres are this near, in spacings of the grid, are one.
@@ -279,74 +273,12 @@ def _inscribed(faces: WallFaces, grid: _Grid, radii: Floats, sides: Integers) ->
     if not len(starts):
         return np.empty((0, 3)), np.empty(0), np.empty(0, dtype=np.int64)
     # Places of a grid that lie round a centre alike are all as good: one is enough.
-    starts = starts[_distinct(grid.places[starts], radii[starts], _BESIDE * grid.spacing, grid.period)]
-    centres, found = _settled(faces, grid.places[starts], radii[starts], grid.spacing)
+    starts = starts[distinct(grid.places[starts], radii[starts], _BESIDE * grid.spacing, grid.period)]
+    centres, found = settled(faces, grid.places[starts], radii[starts], grid.spacing)
     if grid.period is not None:
         centres = np.mod(centres, grid.period)
-    kept = _distinct(centres, found, _SAME * grid.spacing, grid.period)
+    kept = distinct(centres, found, _SAME * grid.spacing, grid.period)
     return centres[kept], found[kept], sides[starts][kept]
-
-
-def _settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -> tuple[Floats, Floats]:
-    """Move centres until their spheres are as large as they get.
-
-    The radius is the least of the distances to the feet, and each of these grows with the way along its own
-    direction: a linear programme says where all of them grow most, within a step that gets shorter where it promised
-    too much (sequential linear programming).
-    """
-    centres, radii = centres.copy(), radii.copy()
-    reach = np.full(len(centres), spacing / 2)
-    moving = np.arange(len(centres))
-    least = spacing * (_SETTLED if len(centres) <= _MANY else _SETTLED_ENOUGH)
-    for _ in range(_MOST_MOVES):
-        steps, gains = _best_steps(faces.feet(centres[moving], _TOUCHING), reach[moving])
-        tried, outside, _ = faces.feet(centres[moving] + steps, _TOUCHING).nearest()
-        better = outside & (tried > radii[moving])
-        promised = better & (tried - radii[moving] >= _KEPT_PROMISE * gains)
-        centres[moving[better]] += steps[better]
-        radii[moving[better]] = tried[better]
-        reach[moving[~promised]] /= 4
-        moving = moving[(gains > least) & (reach[moving] > least)]
-        if not len(moving):
-            break
-    return centres, radii
-
-
-def _best_steps(feet: Feet, reach: Floats) -> tuple[Floats, Floats]:
-    """Steps, each coordinate within reach, that let the least distance to the feet grow most, and by how much.
-
-    The programmes of all centres are solved as one: nothing joins them but that their gains are added.
-    """
-    from scipy.optimize import linprog
-    from scipy.sparse import csr_array
-
-    count = len(feet.distance)
-    nearest = np.arange(_TOUCHING) == np.argmin(feet.distance, axis=1)[:, np.newaxis]
-    which, foot = np.nonzero(feet.found | nearest)
-    distance = feet.distance[which, foot]
-    # r - (away / distance) . step <= distance, in the unknowns x, y, z and r of each centre.
-    values = np.column_stack([-feet.away[which, foot] / distance[:, np.newaxis], np.ones(len(which))])
-    columns = 4 * which[:, np.newaxis] + np.arange(4)
-    rows = csr_array((values.ravel(), columns.ravel(), 4 * np.arange(len(which) + 1)), shape=(len(which), 4 * count))
-    bounds = np.repeat(np.column_stack([-reach, reach]), 4, axis=0)
-    bounds[3::4] = [-np.inf, np.inf]
-    gain = np.tile([0.0, 0.0, 0.0, -1.0], count)
-    # SciPy takes sparse rows, which its stubs do not know.
-    best: Any = linprog(gain, rows, distance, bounds=bounds)  # type: ignore[call-overload]
-    if best.status != 0:
-        return np.zeros((count, 3)), np.zeros(count)
-    found = best.x.reshape(count, 4)
-    return found[:, :3], found[:, 3] - feet.distance.min(axis=1)
-
-
-def _distinct(centres: Floats, radii: Floats, apart: float, period: float | None) -> Integers:
-    """Of spheres with nearly one centre, the largest."""
-    order = np.argsort(-radii, kind="stable")
-    tree = tree_of(centres[order], period)
-    kept = np.ones(len(order), dtype=bool)
-    for first, second in tree.query_pairs(apart, output_type="ndarray"):
-        kept[max(first, second)] = False
-    return np.sort(order[kept])
 
 
 def _covering_radii(grid: _Grid, radii: Floats, pore: Booleans, centres: Floats, largest: Floats) -> Floats:

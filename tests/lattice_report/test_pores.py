@@ -113,6 +113,15 @@ def test_pores_scale_with_the_cell() -> None:
     assert spheres(wall=3 * WALL, size=3 * SIZE)[1].max() == pytest.approx(3 * spheres()[1].max(), rel=1e-6)
 
 
+def test_faces_with_weights_have_the_pores_of_those_without() -> None:
+    weights = tuple(tuple(1 + 0.1 * ((i * j) % 3) for j in (0, 1, 2, 3, 3, 2, 1, 0)) for i in (0, 1, 2, 3, 3, 2, 1, 0))
+    found = [
+        inscribed_spheres(Lattice((1, 1, 1), SIZE, WALL, fit=FitSettings(8, weights=some)).laid())[1].max()
+        for some in (None, weights)
+    ]
+    assert found[0] == pytest.approx(found[1], abs=1e-3)
+
+
 def test_how_many_cells_there_are_does_not_matter_where_all_are_alike(gyroid: Pores) -> None:
     assert gyroid.beyond == "endless"
     assert pores_of(Lattice((1, 1, 1), SIZE, WALL).laid()).sizes.as_dict() == gyroid.sizes.as_dict()

@@ -85,7 +85,7 @@ def _report(given: dict[str, Any], subdivisions: int, progress: Progress | None)
     if not is_report_file(path):
         from gyroid_cad.formats import FORMATS
 
-        raise ParameterError("file", path, f"a lattice in a .toml file, or a file ending in {', '.join(FORMATS)}")
+        raise ParameterError("input file", path, f"a lattice in a .toml file, or a file ending in {', '.join(FORMATS)}")
     context = click.get_current_context()
     line = click.core.ParameterSource.COMMANDLINE
     mixed = [name for name in context.params if name not in _COMMON and context.get_parameter_source(name) == line]

@@ -57,9 +57,9 @@ def read_contents(path: str) -> FileContents:
     """
     target = Path(path)
     if not is_report_file(path):
-        raise ParameterError("file", path, f"a file name ending in {', '.join(FORMATS)}")
+        raise ParameterError("input file", path, f"a file name ending in {', '.join(FORMATS)}")
     if not target.is_file():
-        raise ParameterError("file", path, "a file that exists")
+        raise ParameterError("input file", path, "a file that exists")
     return _triangles_of(target) if FORMATS[target.suffix.lower()] in TRIANGLE_FORMATS else _shape_of(target)
 
 

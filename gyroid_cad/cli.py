@@ -17,6 +17,7 @@ from gyroid_cad.cli_fill import fill_command
 from gyroid_cad.cli_lattice import lattice_of, lattice_options, option_name, printed_options
 from gyroid_cad.cli_mesh import mesh_command, volumes_command
 from gyroid_cad.cli_print import print_check_command
+from gyroid_cad.cli_report import report_command
 from gyroid_cad.cli_view import view_command
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.tables import print_built, print_check_table, print_table, shown_progress
@@ -135,7 +136,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
 
 for _command in (
     *(fill_command, mesh_command, volumes_command, view_command, print_check_command),
-    *(doctor_command, completion_command),
+    *(report_command, doctor_command, completion_command),
 ):
     commands.add_command(_command)
 

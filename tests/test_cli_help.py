@@ -93,7 +93,7 @@ def test_every_example_runs_with_fewer_cells(name: str, line: str, folder: Path,
         # Nobody is there to close a window.
         arguments += ["--screenshot", "view.png"]
     takes_a_fit = any(option.name == "control_points" for option in commands.commands[arguments[0]].params)
-    of_a_file = name in ("view", "print-check") and not arguments[1].startswith("-")
+    of_a_file = name in ("view", "print-check", "report") and not arguments[1].startswith("-")
     if takes_a_fit and not of_a_file and "--control-points" not in arguments:
         arguments += _QUICK_FIT
     if "*" in line:

@@ -95,14 +95,17 @@ def _read_3mf(path: Path) -> tuple[Floats, Integers]:
         objects, vertices, triangles, count = flat.GetMeshObjects(), [], [], 0
         while objects.MoveNext():
             mesh = objects.GetCurrentMeshObject()
-            places = np.array([tuple(place.Coordinates) for place in mesh.GetVertices()], dtype=float).reshape(-1, 3)
-            facets = [tuple(facet.Indices) for facet in mesh.GetTriangleIndices()]
-            vertices.append(places * unit)
-            triangles.append(np.array(facets, dtype=np.int64).reshape(-1, 3) + count)
-            count += len(places)
+            vertices.append(_array(mesh.GetVertices(), "<f4").astype(np.float64) * unit)
+            triangles.append(_array(mesh.GetTriangleIndices(), "<u4").astype(np.int64) + count)
+            count += len(vertices[-1])
     except lib3mf.ELib3MFException as problem:
         raise ParameterError("file", str(path), f"{_EXPECTED}: lib3mf says {problem}") from None
     return np.concatenate([np.zeros((0, 3)), *vertices]), np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles])
+
+
+def _array(structures: Any, kind: str) -> NDArray[Any]:
+    """The library's vertices or triangles, three numbers each, as an array."""
+    return np.frombuffer(bytearray(b"".join(map(bytes, structures))), kind).reshape(-1, 3)
 
 
 def _millimetres(unit: Any) -> float:

@@ -31,7 +31,8 @@ def placed_3mf(path: Path, unit: lib3mf.ModelUnit) -> None:
     group.AddComponent(mesh, wrapper.GetTranslationTransform(10, 0, 0))
     model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
     model.AddBuildItem(group, wrapper.GetIdentityTransform())
-    model.QueryWriter("3mf").WriteToFile(str(path))
+    # To a file the library writes in a locale of its own, and leaves the process in it.
+    path.write_bytes(bytes(model.QueryWriter("3mf").WriteToBuffer()))
 
 
 @pytest.mark.parametrize("ending", ["stl", "3mf"])

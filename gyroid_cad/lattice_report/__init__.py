@@ -1,0 +1,1 @@
+"""What a lattice, or a file, is: measured, drawn, and put on one page that needs nothing else."""

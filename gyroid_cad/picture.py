@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from base64 import b64encode
 from collections.abc import Iterator
 from operator import index
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from gyroid_cad.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["CAMERA", "MOST_DRAWN_PATCHES", "SIZE", "draw", "png", "require_view", "view_axes"]
+__all__ = ["CAMERA", "MOST_DRAWN_PATCHES", "SIZE", "data_uri", "draw", "png", "require_view", "view_axes"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -144,6 +145,11 @@ def png(image: Bytes) -> bytes:
     return _PNG_SIGNATURE + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
     )
+
+
+def data_uri(image: bytes) -> str:
+    """A PNG file as an address that holds it (RFC 2397)."""
+    return "data:image/png;base64," + b64encode(image).decode("ascii")
 
 
 def _planes(corners: Floats) -> Floats:

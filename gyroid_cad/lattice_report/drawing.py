@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -13,7 +10,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.arrays import dot, freeze_arrays
 
-__all__ = ["VIEWS", "Facets", "View", "data_uri", "drawn", "png"]
+__all__ = ["VIEWS", "Facets", "View", "drawn"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -188,27 +185,3 @@ def _averaged(shades: Floats, covered: NDArray[np.bool_], width: int, height: in
     colour = shades.reshape(*blocks, 3).sum(axis=(1, 3)) / np.maximum(opaque * _FINER**2, 1)[..., np.newaxis]
     picture = np.concatenate([colour, opaque[..., np.newaxis]], axis=-1)
     return np.asarray(np.round(picture * 255), dtype=np.uint8)
-
-
-def png(picture: Bytes) -> bytes:
-    """A picture as PNG (ISO/IEC 15948): true colour with alpha, each row told by its differences from the one above.
-
-    Parameters
-    ----------
-    picture : ndarray of uint8, shape (height, width, 4)
-    """
-    height, width, _ = picture.shape
-    flat = picture.reshape(height, -1)
-    above = np.vstack([np.zeros_like(flat[:1]), flat[:-1]])
-    # Filter type 2, "up"; differences are of bytes, and wrap.
-    rows = np.hstack([np.full((height, 1), 2, dtype=np.uint8), flat - above])
-    header = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes())), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
-    )
-
-
-def data_uri(image: bytes) -> str:
-    """A PNG as an address that holds it (RFC 2397)."""
-    return "data:image/png;base64," + b64encode(image).decode("ascii")

@@ -16,11 +16,12 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.files import replacing, require_writable
 from gyroid_cad.lattice_report.charts import histogram
 from gyroid_cad.lattice_report.data import NONE, Report
-from gyroid_cad.lattice_report.drawing import VIEWS, Facets, data_uri, drawn, png
+from gyroid_cad.lattice_report.drawing import VIEWS, Facets, drawn
 from gyroid_cad.lattice_report.facets import COLOURS
 from gyroid_cad.lattice_report.style import STYLE
 from gyroid_cad.lattice_report.words import NOTES, TITLES, label_of
 from gyroid_cad.mesh.summaries import shown_name
+from gyroid_cad.picture import data_uri, png
 from gyroid_cad.version import __version__
 
 __all__ = ["page_of", "require_page", "write_page"]

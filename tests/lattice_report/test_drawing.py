@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.lattice_report.charts import histogram, ticks
-from gyroid_cad.lattice_report.drawing import VIEWS, Facets, View, drawn, png
+from gyroid_cad.lattice_report.drawing import VIEWS, Facets, View, drawn
 from gyroid_cad.lattice_report.facets import facets_of_triangles, facets_of_wall
+from gyroid_cad.picture import png
 
 ABOVE = View("above", (0, 0, 1), (0, 1, 0))
 Bytes = NDArray[np.uint8]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["dot", "freeze_arrays"]
+__all__ = ["cross", "dot", "freeze_arrays"]
 
 
 def freeze_arrays(instance: Any) -> None:
@@ -25,6 +25,11 @@ def freeze_arrays(instance: Any) -> None:
             stored = np.array(value, order="C")
             stored.setflags(write=False)
             object.__setattr__(instance, field.name, stored)
+
+
+def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vector products, components first: several times quicker than ``numpy.cross``."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,6 +20,7 @@ from gyroid_cad.cli_print import print_check_command
 from gyroid_cad.cli_report import report_command
 from gyroid_cad.cli_view import view_command
 from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.files import file_sizes
 from gyroid_cad.tables import print_built, print_check_table, print_table, shown_progress
 
 if TYPE_CHECKING:
@@ -239,9 +240,8 @@ def _with_option_name(problem: ParameterError) -> str:
 def _summary(
     report: AssemblyReport | LatticeReport | TriangleReport, outputs: Sequence[str], total: float
 ) -> dict[str, Any]:
-    from pathlib import Path
 
     summary = asdict(report)
     summary["seconds"] = {stage: round(value, 4) for stage, value in {**report.seconds, "total": total}.items()}
-    summary["files"] = [{"path": path, "bytes": Path(path).stat().st_size} for path in outputs]
+    summary["files"] = file_sizes(outputs)
     return summary

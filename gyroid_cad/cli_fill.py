@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import click
 
 from gyroid_cad.cli_lattice import chosen_surface, surface_option
+from gyroid_cad.files import file_sizes
 from gyroid_cad.tables import print_fill, shown_progress
 
 __all__ = ["fill_command"]
@@ -101,7 +101,7 @@ def fill_command(
         filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
-    summary["files"] = [{"path": path, "bytes": Path(path).stat().st_size} for path in output]
+    summary["files"] = file_sizes(output)
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,6 +18,7 @@ __all__ = [
     "lattice_options",
     "lattice_options_beside",
     "option_name",
+    "options_given",
     "printed_options",
     "surface_option",
 ]
@@ -144,6 +145,13 @@ def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callab
         return argument(function)
 
     return given_to
+
+
+def options_given(but: Collection[str]) -> list[str]:
+    """Options that stand on the command line itself, as they are called there, but for those named."""
+    context, line = click.get_current_context(), click.core.ParameterSource.COMMANDLINE
+    named = [name for name in context.params if name not in but and context.get_parameter_source(name) == line]
+    return [option_name(name) for name in named]
 
 
 def chosen_surface(name: str | None) -> dict[str, Any]:

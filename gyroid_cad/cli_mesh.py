@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 import click
 
 from gyroid_cad.cli_lattice import lattice_of, lattice_options
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.files import file_sizes, require_distinct
 from gyroid_cad.stages import timed
 from gyroid_cad.tables import print_mesh, print_table, print_volumes, shown_progress
 
@@ -28,7 +26,9 @@ __all__ = ["mesh_command", "volumes_command"]
     help=".vtu, .msh (Gmsh), .inp (Abaqus, CalculiX), .cdb (ANSYS), .bdf or .nas (NASTRAN); may be repeated.",
 )
 @lattice_options
-@click.option("--subdivisions", type=int, metavar="N", help="Elements along each side of a patch; 24 patches a cell.")
+@click.option(
+    "--subdivisions", type=int, metavar="N", help="Elements along each side of a patch, of 24 a gyroid's cell."
+)
 @click.option(
     "--layers",
     type=int,
@@ -70,7 +70,9 @@ def mesh_command(
     if subdivisions is None:
         raise click.UsageError("Missing option '--subdivisions'.")
     lattice = lattice_of(given)
-    targets = _distinct(output, lambda path: require_mesh_format(path, full))
+    if not output:
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    targets = require_distinct(output, lambda path: require_mesh_format(path, full))
     if histogram is not None:
         from gyroid_cad.mesh.quality_picture import draw_quality, require_histogram
 
@@ -106,7 +108,7 @@ def mesh_command(
         "sets": {name: len(some) for name, some in {**made.node_sets(), **made.element_sets()}.items()},
         "periodic_pairs": 0 if pairs is None else len(pairs),
         "quality": None if measured is None else measured.as_dict(),
-        "files": _sizes(files),
+        "files": file_sizes(files),
         "seconds": time.perf_counter() - start,
     }
     if as_json:
@@ -143,7 +145,9 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
     from gyroid_cad.mesh.volume_files import require_volume_file, write_volumes
 
     lattice = lattice_of(given)
-    targets = _distinct(output, require_volume_file)
+    if not output:
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    targets = require_distinct(output, require_volume_file)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.laid(progress)
         with timed({}, "volumes", progress):
@@ -156,24 +160,10 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
         "degrees": list(made.degrees),
         "control_points": len(made.control_points),
         "interfaces": len(made.interfaces),
-        "files": _sizes(output),
+        "files": file_sizes(output),
         "seconds": time.perf_counter() - start,
     }
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
         print_volumes(summary)
-
-
-def _distinct(output: tuple[str, ...], checked: Callable[[str], Path]) -> list[Path]:
-    """The files to write, each checked before anything is made."""
-    if not output:
-        raise click.UsageError("Missing option '-o' / '--output'.")
-    targets = [checked(path) for path in output]
-    if len({target.resolve() for target in targets}) < len(targets):
-        raise ParameterError("output", list(output), "each file once")
-    return targets
-
-
-def _sizes(paths: Iterable[str]) -> list[dict[str, Any]]:
-    return [{"path": path, "bytes": Path(path).stat().st_size} for path in paths]

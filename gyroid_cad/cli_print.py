@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli_lattice import lattice_of, lattice_options_beside, option_name
+from gyroid_cad.cli_lattice import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.tables import print_check_table, shown_progress
 
 __all__ = ["print_check_command"]
@@ -55,13 +55,9 @@ def print_check_command(
     if file is None or Path(file).suffix.lower() not in _FILE_ENDINGS:
         part = lattice_of(given)
     else:
-        described = [
-            name
-            for name in given
-            if name not in _HOW and context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-        ]
+        described = options_given(_HOW)
         if described:
-            raise click.UsageError(f"{file} is a part already: none of {', '.join(map(option_name, described))}")
+            raise click.UsageError(f"{file} is a part already: none of {', '.join(described)}")
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         check = print_check(part, chosen, deviation, progress)
     if as_json:

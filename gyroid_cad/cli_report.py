@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gyroid_cad.cli_lattice import lattice_of, lattice_options_beside, option_name
+from gyroid_cad.cli_lattice import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.tables import print_table, shown_progress
 
@@ -95,11 +95,9 @@ def _report(given: dict[str, Any], subdivisions: int, printer: str, progress: Pr
         from gyroid_cad.formats import FORMATS
 
         raise ParameterError("input file", path, f"a lattice in a .toml file, or a file ending in {', '.join(FORMATS)}")
-    context = click.get_current_context()
-    line = click.core.ParameterSource.COMMANDLINE
-    mixed = [name for name in context.params if name not in _COMMON and context.get_parameter_source(name) == line]
+    mixed = options_given(_COMMON)
     if mixed:
-        raise click.UsageError(f"of a file there is nothing to choose: without {', '.join(map(option_name, mixed))}")
+        raise click.UsageError(f"of a file there is nothing to choose: without {', '.join(mixed)}")
     return report_on_file(path, progress)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from gyroid_cad.errors import ExportError, ParameterError
 
-__all__ = ["replacing", "require_writable"]
+__all__ = ["file_sizes", "replacing", "require_distinct", "require_writable"]
 
 
 def require_writable(path: str | os.PathLike[str]) -> Path:
@@ -32,6 +33,34 @@ def require_writable(path: str | os.PathLike[str]) -> Path:
     if not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
         raise ParameterError("output", str(path), f"a file that may be written; {folder} does not allow it")
     return target
+
+
+def require_distinct(
+    paths: Sequence[str | os.PathLike[str]], checked: Callable[[str | os.PathLike[str]], Path]
+) -> list[Path]:
+    """Check files to be written, one by one and that each is there once, before any work is done.
+
+    Parameters
+    ----------
+    paths : sequence of path-like
+    checked : callable
+        Gives a path where a file can be put, or raises.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not paths:
+        raise ParameterError("output", [], "at least one file name")
+    targets = [checked(path) for path in paths]
+    if len({target.resolve() for target in targets}) < len(targets):
+        raise ParameterError("output", [str(path) for path in paths], "each file once")
+    return targets
+
+
+def file_sizes(paths: Iterable[str | os.PathLike[str]]) -> list[dict[str, Any]]:
+    """Path and bytes of files that were written, as plain values ready for JSON."""
+    return [{"path": str(path), "bytes": Path(path).stat().st_size} for path in paths]
 
 
 @contextmanager

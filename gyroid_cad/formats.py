@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.files import require_writable
+from gyroid_cad.files import require_distinct, require_writable
 
 __all__ = [
     "DEFAULT_ANGLE",
@@ -37,16 +37,13 @@ def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     ------
     ParameterError
     """
-    if not paths:
-        raise ParameterError("output", [], "at least one file name")
-    targets = []
-    for path in paths:
-        if Path(path).suffix.lower() not in FORMATS:
-            raise ParameterError("output", str(path), f"a file name ending in {', '.join(FORMATS)}")
-        targets.append(require_writable(path))
-    if len({target.resolve() for target in targets}) < len(targets):
-        raise ParameterError("output", [str(path) for path in paths], "each file once")
-    return targets
+    return require_distinct(paths, _require_format)
+
+
+def _require_format(path: str | os.PathLike[str]) -> Path:
+    if Path(path).suffix.lower() not in FORMATS:
+        raise ParameterError("output", str(path), f"a file name ending in {', '.join(FORMATS)}")
+    return require_writable(path)
 
 
 def require_schema(schema: str) -> str:

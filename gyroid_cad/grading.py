@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import cross
 from gyroid_cad.errors import SoundnessError
 from gyroid_cad.families import USUAL, MinimalSurface
 from gyroid_cad.fields import Field, evaluated, given_as
@@ -206,15 +207,11 @@ def _values(parameter: str, value: float | Field | None, points: Floats) -> Floa
 def _turned(jacobian: Floats, normals: Floats) -> Floats:
     """Cofactors of the Jacobian times the normals, det(J) J^-T n: the area vector of the mapped surface."""
     x, y, z = jacobian[:, 0], jacobian[:, 1], jacobian[:, 2]
-    return np.asarray(normals[0] * _cross(y, z) + normals[1] * _cross(z, x) + normals[2] * _cross(x, y))
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.asarray(normals[0] * cross(y, z) + normals[1] * cross(z, x) + normals[2] * cross(x, y))
 
 
 def _positive_determinant(parameter: str, jacobian: Floats, points: Floats) -> Floats:
-    determinant = np.sum(jacobian[:, 0] * _cross(jacobian[:, 1], jacobian[:, 2]), axis=0)
+    determinant = np.sum(jacobian[:, 0] * cross(jacobian[:, 1], jacobian[:, 2]), axis=0)
     reason, quantity = "where space is turned inside out", "Jacobian determinant"
     _require(parameter, determinant, points, 0.0, "above", reason, quantity)
     return np.asarray(determinant)

@@ -391,7 +391,7 @@ class Lattice:
         Parameters
         ----------
         subdivisions : int
-            Elements along each side of a patch; a cell has 24 patches.
+            Elements along each side of a patch; a gyroid's cell has 24 patches.
         layers : int
             Across the wall.
         order : {1, 2}

@@ -27,9 +27,8 @@ def hexahedral_mesh(laid: LaidWall, subdivisions: int, layers: int, order: int, 
     mesh = hexahedra(laid.wall, subdivisions, layers, order, full)
     # Of patches that are alike one is looked at.
     patches = np.unique(laid.wall.patch_net, return_index=True)[1]
-    elements = mesh.cells.reshape(laid.complex.patch_count, -1, mesh.cells.shape[1])[patches].reshape(
-        -1, mesh.cells.shape[1]
-    )
+    nodes = mesh.cells.shape[1]
+    elements = mesh.cells.reshape(laid.complex.patch_count, -1, nodes)[patches].reshape(-1, nodes)
     bad = inverted(mesh.points, elements)
     if len(bad.elements):
         worst = int(np.argmin(bad.determinants))

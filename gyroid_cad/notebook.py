@@ -6,7 +6,6 @@ stands in the HTML itself, for notebooks, and once more by itself, for what know
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ import numpy as np
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.mesh.corners import indexed_triangles
 from gyroid_cad.mesh.triangulation import triangulated
-from gyroid_cad.picture import Vector, draw, png
+from gyroid_cad.picture import Vector, data_uri, draw, png
 from gyroid_cad.wall import Wall
 
 if TYPE_CHECKING:
@@ -87,9 +86,9 @@ def mime_bundle(title: str, rows: Callable[[], Sequence[tuple[str, str]]], pictu
     shown, lines = "", [("", title)]
     try:
         lines += rows()
-        encoded = b64encode(picture()).decode("ascii")
-        data["image/png"] = encoded
-        shown = f'<img alt="{escape(title)}" src="data:image/png;base64,{encoded}">'
+        address = data_uri(picture())
+        data["image/png"] = address.partition(",")[2]
+        shown = f'<img alt="{escape(title)}" src="{address}">'
     except GyroidError as problem:
         # An object that cannot be shown is no reason for a traceback in place of it.
         lines.append(("not shown", str(problem)))

@@ -18,6 +18,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import cross
+
 __all__ = ["HEXAHEDRON_FACES", "NO_NUMBER", "hexahedron_corner_measures", "quadrilateral_corner_measures"]
 
 Floats = NDArray[np.float64]
@@ -65,9 +67,9 @@ def quadrilateral_corner_measures(corners: Floats) -> Measures:
     corners = _in_parts_of_their_size(corners)
     edges = np.roll(corners, -1, axis=1) - corners
     lengths = _length(edges)
-    normals = _cross(np.roll(edges, 1, axis=1), edges)
+    normals = cross(np.roll(edges, 1, axis=1), edges)
     axes = np.einsum("ak,ckm->cam", _QUADRILATERAL_AXES, corners)
-    signed = np.sum(normals * _unit(_cross(axes[:, 0], axes[:, 1]))[:, np.newaxis], axis=0)
+    signed = np.sum(normals * _unit(cross(axes[:, 0], axes[:, 1]))[:, np.newaxis], axis=0)
     products = np.roll(lengths, 1, axis=0) * lengths
     collapsed = np.any(lengths <= _NOTHING, axis=0)
     smallest, largest = _angles(edges, normals, signed, collapsed)
@@ -128,8 +130,8 @@ def hexahedron_corner_measures(corners: Floats) -> Measures:
 def _face_measures(corners: Floats) -> tuple[Floats, Floats, Floats]:
     """Warpage, smallest and largest angle of faces already in parts of their element's size."""
     edges = np.roll(corners, -1, axis=1) - corners
-    normals = _cross(np.roll(edges, 1, axis=1), edges)
-    across = _unit(_cross(edges[:, 0] - edges[:, 2], edges[:, 1] - edges[:, 3]))
+    normals = cross(np.roll(edges, 1, axis=1), edges)
+    across = _unit(cross(edges[:, 0] - edges[:, 2], edges[:, 1] - edges[:, 3]))
     signed = np.sum(normals * across[:, np.newaxis], axis=0)
     collapsed = np.any(_length(edges) <= _NOTHING, axis=0)
     return _warpage(normals), *_angles(edges, normals, signed, collapsed)
@@ -168,12 +170,8 @@ def _unit(vectors: Floats) -> Floats:
     return _quotient(vectors, _length(vectors), 0.0)
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
 def _determinant(a: Floats, b: Floats, c: Floats) -> Floats:
-    return np.asarray(np.sum(a * _cross(b, c), axis=0))
+    return np.asarray(np.sum(a * cross(b, c), axis=0))
 
 
 def _quotient(numerator: Floats, denominator: Floats, otherwise: float) -> Floats:

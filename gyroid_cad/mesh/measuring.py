@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.arrays import cross
 from gyroid_cad.mesh.templates import (
     Template,
     face_template,
@@ -181,7 +182,7 @@ def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) 
 
 
 def _deviations(chords: Floats, rates: Floats, controls: Floats) -> Floats:
-    normals = _cross(_components(rates[0], controls), _components(rates[1], controls))
+    normals = cross(_components(rates[0], controls), _components(rates[1], controls))
     along = np.abs(np.sum(_components(chords, controls) * normals, axis=0))
     return np.asarray(np.max(along / np.sqrt(np.sum(normals**2, axis=0)), axis=1))
 
@@ -190,18 +191,13 @@ def _sums(template: Template, nodes: Floats, controls: Floats) -> Floats:
     """Of surfaces, the sum over triangles of det(a, b, c) / 6, and that of the vectors of area; (surfaces, 4)."""
     points = _components(nodes, controls)
     a, b, c = (points[:, :, template.triangles[:, k]] for k in range(3))
-    twice = _cross(b - a, c - a)
+    twice = cross(b - a, c - a)
     return np.column_stack([np.sum(a * twice, axis=(0, 2)) / 6, twice.sum(axis=2).T / 2])
 
 
 def _components(matrix: Floats, controls: Floats) -> Floats:
     """Products with the control points; components first, then surfaces and places."""
     return np.ascontiguousarray(np.moveaxis(images(matrix, controls), -1, 0))
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    """Vector products, components first: several times quicker than ``numpy.cross``."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _shifted(sums: Floats, shifts: Floats) -> float:

@@ -14,9 +14,9 @@ import numpy as np
 
 from benchmarks.subject import CELL_SIZE, THICKNESS, block, block_solid, kernel_volume
 from benchmarks.timing import Row, plain_table, print_verdicts
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import FitReport, FitSettings, FittedPatch, fit_patch, fit_report
-from gyroid_cad.nurbs import gauss_points
+from gyroid_cad.nurbs.surface import gauss_points
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitReport, FitSettings, FittedPatch, fit_patch, fit_report
 
 TUBE = USUAL.tube
 

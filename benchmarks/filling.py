@@ -31,16 +31,16 @@ from benchmarks.memory import peak
 from benchmarks.solid_against_thickening import copies, thickened
 from benchmarks.subject import CELL_SIZE, THICKNESS, kernel_volume, sewn
 from benchmarks.timing import Row, best_in_turn, fresh_python, plain_table, print_verdicts
-from gyroid_cad.complex import build_complex
-from gyroid_cad.covering import Frame, covering_complex, nearest_offsets
-from gyroid_cad.exact_wall import patch_points_and_normals
-from gyroid_cad.families import USUAL
-from gyroid_cad.filling import fill
-from gyroid_cad.fit import fit_patch
+from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.solid import realise
 from gyroid_cad.kernel.step import read_step, write_step
-from gyroid_cad.wall import build_wall
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.covering import Frame, covering_complex, nearest_offsets
+from gyroid_cad.wall.exact import patch_points_and_normals
+from gyroid_cad.wall.offset import build_wall
 
 TUBE = USUAL.tube
 

@@ -23,18 +23,18 @@ from numpy.typing import NDArray
 
 from benchmarks.timing import Row, best_in_turn, plain_table, print_verdicts
 from gyroid_cad import Cylinder, Lattice
-from gyroid_cad.build import Build
-from gyroid_cad.complex import CellComplex
-from gyroid_cad.exact_wall import _exact_grid
+from gyroid_cad.builds.solid import Build
 from gyroid_cad.kernel.solid import realise
 from gyroid_cad.kernel.step import write_step
 from gyroid_cad.lattice import USUAL_TOLERANCE
-from gyroid_cad.laying import Recipe, lay_wall
-from gyroid_cad.nurbs import basis
-from gyroid_cad.patch import PARAMETERISATIONS
-from gyroid_cad.refit import _fit_operator, fitted_wall
-from gyroid_cad.symmetry import QUARTER
-from gyroid_cad.wall import SIDES, Wall
+from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.surface.patch import PARAMETERISATIONS
+from gyroid_cad.surface.symmetry import QUARTER
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.exact import _exact_grid
+from gyroid_cad.wall.fitted import Recipe, lay_wall
+from gyroid_cad.wall.offset import SIDES, Wall
+from gyroid_cad.wall.refit import _fit_operator, fitted_wall
 
 __all__ = ["main"]
 

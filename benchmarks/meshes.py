@@ -19,11 +19,11 @@ import numpy as np
 
 from benchmarks.subject import CELL_SIZE
 from benchmarks.timing import Row, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
+from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.mesh.hexahedra import hexahedra, quadrilaterals
-from gyroid_cad.mesh.mesh_files import MESH_FORMATS, write_mesh
-from gyroid_cad.meshing import mesh_quality
-from gyroid_cad.nurbs import basis
+from gyroid_cad.mesh.finite_elements.files import MESH_FORMATS, write_mesh
+from gyroid_cad.mesh.finite_elements.hexahedra import hexahedra, quadrilaterals
+from gyroid_cad.nurbs.surface import basis
 
 __all__ = ["main"]
 

@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.timing import Row, plain_table, print_verdicts
-from gyroid_cad.families import SURFACES
-from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
-from gyroid_cad.weierstrass import Family
+from gyroid_cad.surface.families import SURFACES
+from gyroid_cad.surface.fit import FitReport, FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.weierstrass import Family
 
 __all__ = ["main"]
 

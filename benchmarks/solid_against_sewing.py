@@ -27,7 +27,7 @@ from benchmarks.timing import Row, best_of, plain_table, print_verdicts
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.wall import SIDES, Wall
+from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["main"]
 

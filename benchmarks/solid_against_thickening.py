@@ -30,13 +30,13 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from benchmarks.subject import CELL_SIZE, THICKNESS, block_solid, kernel_volume, sewn, translation
 from benchmarks.timing import Row, best_in_turn, plain_table, print_verdicts
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import fit_patch
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.step import write_step
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.symmetry import QUARTER
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.symmetry import QUARTER
 
 TUBE = USUAL.tube
 

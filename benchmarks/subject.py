@@ -11,10 +11,10 @@ from OCP.GProp import GProp_GProps
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.complex import build_complex
-from gyroid_cad.fit import fit_patch
 from gyroid_cad.kernel.solid import realise
-from gyroid_cad.wall import Wall, build_wall
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.offset import Wall, build_wall
 
 __all__ = ["CELL_SIZE", "THICKNESS", "block", "block_solid", "kernel_volume", "sewn", "translation"]
 

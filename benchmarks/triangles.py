@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import Row, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
-from gyroid_cad.files import replacing
-from gyroid_cad.mesh.corners import indexed_triangles
-from gyroid_cad.mesh.measuring import enclosed_volume
-from gyroid_cad.mesh.stl import write_stl
-from gyroid_cad.mesh.triangulation import triangulated
-from gyroid_cad.wall import Wall
+from gyroid_cad.common.files import replacing
+from gyroid_cad.mesh.triangles.corners import indexed_triangles
+from gyroid_cad.mesh.triangles.measuring import enclosed_volume
+from gyroid_cad.mesh.triangles.stl import write_stl
+from gyroid_cad.mesh.triangles.triangulation import triangulated
+from gyroid_cad.wall.offset import Wall
 
 __all__ = ["main"]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gyroid_cad.weierstrass import (
+from gyroid_cad.surface.weierstrass import (
     GYROID,
     Family,
     corner_chart_omega,

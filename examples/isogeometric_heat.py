@@ -6,8 +6,8 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import spsolve
 
 from gyroid_cad import Lattice, write_volumes
-from gyroid_cad.mesh.volume_files import write_mfem_field
-from gyroid_cad.mesh.volumes import periodic_points
+from gyroid_cad.mesh.iga.files import write_mfem_field
+from gyroid_cad.mesh.iga.patches import periodic_points
 
 lattice = Lattice(cells=(1, 1, 1), cell_size=10, density=0.3)
 wall = lattice.wall()

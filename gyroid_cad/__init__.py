@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
-    from gyroid_cad.assembly import Assembly, AssemblyReport
-    from gyroid_cad.block_maps import Bend, Cylinder, Sphere, Twist
+    from gyroid_cad.builds.assembly import Assembly, AssemblyReport
+    from gyroid_cad.builds.meshes import mesh_quality
+    from gyroid_cad.builds.triangles import TriangleReport
     from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SoundnessError
-    from gyroid_cad.field_makers import (
+    from gyroid_cad.fields.field import Field
+    from gyroid_cad.fields.makers import (
         between_planes,
         constant,
         distance_from_axis,
@@ -26,21 +28,19 @@ if TYPE_CHECKING:
         smooth_maximum,
         smooth_minimum,
     )
-    from gyroid_cad.fields import Field
-    from gyroid_cad.filling import Filled, FillReport, fill
-    from gyroid_cad.fit import FitReport, FitSettings, fit_patch, fit_report
+    from gyroid_cad.filling.fill import Filled, FillReport, fill
     from gyroid_cad.lattice import Lattice, LatticeReport
-    from gyroid_cad.maps import SpaceMap
-    from gyroid_cad.mesh.abaqus import write_periodic_equations
-    from gyroid_cad.mesh.hexahedra import Mesh
-    from gyroid_cad.mesh.mesh_files import write_mesh
-    from gyroid_cad.mesh.volume_files import write_volumes
-    from gyroid_cad.mesh.volumes import VolumePatches
-    from gyroid_cad.meshing import mesh_quality
-    from gyroid_cad.nurbs import NurbsSurface
-    from gyroid_cad.printers import Printer
-    from gyroid_cad.printing import PrintCheck, print_check
-    from gyroid_cad.triangles import TriangleReport
+    from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
+    from gyroid_cad.maps.space import SpaceMap
+    from gyroid_cad.mesh.finite_elements.abaqus import write_periodic_equations
+    from gyroid_cad.mesh.finite_elements.files import write_mesh
+    from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+    from gyroid_cad.mesh.iga.files import write_volumes
+    from gyroid_cad.mesh.iga.patches import VolumePatches
+    from gyroid_cad.nurbs.surface import NurbsSurface
+    from gyroid_cad.printing.print_check import PrintCheck, print_check
+    from gyroid_cad.printing.printers import Printer
+    from gyroid_cad.surface.fit import FitReport, FitSettings, fit_patch, fit_report
 
 __all__ = [
     "Assembly",
@@ -91,11 +91,11 @@ __all__ = [
 ]
 
 _HOMES = {
-    "assembly": ("Assembly", "AssemblyReport"),
-    "block_maps": ("Bend", "Cylinder", "Sphere", "Twist"),
+    "builds.assembly": ("Assembly", "AssemblyReport"),
+    "maps.block": ("Bend", "Cylinder", "Sphere", "Twist"),
     "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"),
-    "fields": ("Field",),
-    "field_makers": (
+    "fields.field": ("Field",),
+    "fields.makers": (
         "between_planes",
         "constant",
         "distance_from_axis",
@@ -107,20 +107,20 @@ _HOMES = {
         "smooth_maximum",
         "smooth_minimum",
     ),
-    "filling": ("FillReport", "Filled", "fill"),
-    "fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
+    "filling.fill": ("FillReport", "Filled", "fill"),
+    "surface.fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
-    "maps": ("SpaceMap",),
-    "mesh.abaqus": ("write_periodic_equations",),
-    "mesh.hexahedra": ("Mesh",),
-    "mesh.mesh_files": ("write_mesh",),
-    "mesh.volume_files": ("write_volumes",),
-    "mesh.volumes": ("VolumePatches",),
-    "meshing": ("mesh_quality",),
-    "nurbs": ("NurbsSurface",),
-    "printing": ("PrintCheck", "print_check"),
-    "printers": ("Printer",),
-    "triangles": ("TriangleReport",),
+    "maps.space": ("SpaceMap",),
+    "mesh.finite_elements.abaqus": ("write_periodic_equations",),
+    "mesh.finite_elements.hexahedra": ("Mesh",),
+    "mesh.finite_elements.files": ("write_mesh",),
+    "mesh.iga.files": ("write_volumes",),
+    "mesh.iga.patches": ("VolumePatches",),
+    "builds.meshes": ("mesh_quality",),
+    "nurbs.surface": ("NurbsSurface",),
+    "printing.print_check": ("PrintCheck", "print_check"),
+    "printing.printers": ("Printer",),
+    "builds.triangles": ("TriangleReport",),
 }
 
 

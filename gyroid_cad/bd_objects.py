@@ -15,11 +15,11 @@ from build123d import Align, BasePartObject, BuildPart, Compound, Location, Mode
 from build123d.geometry import to_align_offset
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.families import USUAL
-from gyroid_cad.fields import FieldLike
-from gyroid_cad.filling import fill
-from gyroid_cad.fit import FitSettings
+from gyroid_cad.fields.field import FieldLike
+from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings
 
 __all__ = ["Gyroid", "GyroidFill"]
 

@@ -13,11 +13,11 @@ from typing import Any
 import cadquery as cq
 
 from gyroid_cad.errors import GyroidError, ParameterError
-from gyroid_cad.families import USUAL
-from gyroid_cad.fields import FieldLike
-from gyroid_cad.filling import fill
-from gyroid_cad.fit import FitSettings
+from gyroid_cad.fields.field import FieldLike
+from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings
 
 __all__ = ["gyroid", "gyroid_fill"]
 

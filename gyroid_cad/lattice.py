@@ -12,20 +12,31 @@ from typing import TYPE_CHECKING, Self
 
 from numpy.typing import ArrayLike
 
-from gyroid_cad.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
-from gyroid_cad.block_maps import as_map, space_over
-from gyroid_cad.build import Build, build, require_settings
-from gyroid_cad.checks import finite_number, positive_number
-from gyroid_cad.complex import build_complex
+from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
+from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
+from gyroid_cad.builds.report import LatticeReport, report_of
+from gyroid_cad.builds.solid import Build, build, require_settings
+from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
+from gyroid_cad.common.checks import finite_number, positive_number
+from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
+from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.exact_wall import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.families import USUAL, MinimalSurface, surface_named
-from gyroid_cad.fields import Field, FieldLike, as_field
-from gyroid_cad.fit import FitSettings, fit_within
-from gyroid_cad.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
-from gyroid_cad.grading import Grading
-from gyroid_cad.laying import LaidWall, Recipe, laid_wall
-from gyroid_cad.limits import (
+from gyroid_cad.fields.field import Field, FieldLike, as_field
+from gyroid_cad.fields.paper import paper_units
+from gyroid_cad.maps.block import as_map, space_over
+from gyroid_cad.maps.space import BlockMap
+from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
+from gyroid_cad.mesh.iga.patches import VolumePatches
+from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
+from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
+from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
+from gyroid_cad.surface.fit import FitSettings, fit_within
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
+from gyroid_cad.wall.fitted import LaidWall, Recipe, laid_wall
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.limits import (
     require_cell_size,
     require_density,
     require_one,
@@ -33,18 +44,7 @@ from gyroid_cad.limits import (
     sound_tolerance,
     whole_cells,
 )
-from gyroid_cad.maps import BlockMap
-from gyroid_cad.mesh.hexahedra import Mesh
-from gyroid_cad.mesh.periodic import PeriodicPairs, periodic_pairs
-from gyroid_cad.mesh.volumes import VolumePatches
-from gyroid_cad.meshing import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
-from gyroid_cad.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
-from gyroid_cad.paper import paper_units
-from gyroid_cad.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
-from gyroid_cad.report import LatticeReport, report_of
-from gyroid_cad.stages import Progress, timed
-from gyroid_cad.triangles import TriangleReport, Triangles, triangle_report, triangles
-from gyroid_cad.wall import Wall
+from gyroid_cad.wall.offset import Wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
 from gyroid_cad import Cylinder, Lattice, NurbsSurface, distance_from_axis
-from gyroid_cad.wall import SIDES, Wall
+from gyroid_cad.wall.offset import SIDES, Wall
 
 FOLDER = Path(__file__).parent
 WALL_COLOUR, RIM_COLOUR, LINE_COLOUR = (0.87, 0.68, 0.32), (0.97, 0.88, 0.66), (0.18, 0.16, 0.13)

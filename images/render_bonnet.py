@@ -14,7 +14,7 @@ import vtk
 from numpy.typing import NDArray
 from render import FOLDER, WALL_COLOUR, Grids, outline_actor, surface_actor, write_picture
 
-from gyroid_cad.weierstrass import GYROID, Family, normals, points
+from gyroid_cad.surface.weierstrass import GYROID, Family, normals, points
 
 Floats = NDArray[np.float64]
 

@@ -14,11 +14,18 @@ from render import FOLDER, LINE_COLOUR, write_picture
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
 from gyroid_cad import Lattice
-from gyroid_cad.mesh.quality import Quality, element_measures, quality_report, quality_rows, shown_name, shown_number
-from gyroid_cad.mesh.quality_picture import draw_quality
-from gyroid_cad.meshing import mesh_quality
-from gyroid_cad.patch import PARAMETERISATIONS
-from gyroid_cad.tables import print_table
+from gyroid_cad.builds.meshes import mesh_quality
+from gyroid_cad.cli.console import print_table
+from gyroid_cad.mesh.finite_elements.quality import (
+    Quality,
+    element_measures,
+    quality_report,
+    quality_rows,
+    shown_name,
+    shown_number,
+)
+from gyroid_cad.mesh.finite_elements.quality_picture import draw_quality
+from gyroid_cad.surface.patch import PARAMETERISATIONS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

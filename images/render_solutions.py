@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from render import FOLDER, LINE_COLOUR, write_picture
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
-from gyroid_cad.nurbs_volume import NurbsVolume
+from gyroid_cad.nurbs.volume import NurbsVolume
 
 Floats = NDArray[np.float64]
 Colours = tuple[tuple[float, float, float], ...]

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gyroid_cad.fit import FitSettings
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.nurbs import basis, uniform_knots
-from gyroid_cad.rims import PLANES, Faces
+from gyroid_cad.nurbs.surface import basis, uniform_knots
+from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.edge_crossings import PLANES, Faces
 
 CELL_SIZE = 10.0
 THICKNESS = 0.8

@@ -11,9 +11,9 @@ import pytest
 
 from gyroid_cad.bd_objects import Gyroid, GyroidFill
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.field_makers import linear
-from gyroid_cad.fit import FitSettings
+from gyroid_cad.fields.makers import linear
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.surface.fit import FitSettings
 
 GYROID: dict[str, Any] = {"cells": (1, 1, 1), "cell_size": 10.0, "thickness": 0.8, "fit": FitSettings(4)}
 # Seen from the middle of the lattice, the centre of one of its patches: a small box there cuts few faces.

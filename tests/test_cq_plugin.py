@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import gyroid_cad.cq_plugin
-from gyroid_cad.block_maps import Twist
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.field_makers import linear
-from gyroid_cad.filling import fill
-from gyroid_cad.fit import FitSettings
+from gyroid_cad.fields.makers import linear
+from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.maps.block import Twist
+from gyroid_cad.surface.fit import FitSettings
 
 GYROID: dict[str, Any] = {"cells": (1, 1, 1), "cell_size": 10.0, "thickness": 0.8, "fit": FitSettings(4)}
 # Seen from the middle of the lattice, the centre of one of its patches: a small box there cuts few faces.

@@ -17,10 +17,10 @@ import pytest
 from scipy.special import ellipk
 
 import gyroid_cad
-from gyroid_cad.cli import main
-from gyroid_cad.families import SURFACES
-from gyroid_cad.fit import FitSettings, fit_patch, fit_report
-from gyroid_cad.weierstrass import CORNER
+from gyroid_cad.cli.app import main
+from gyroid_cad.surface.families import SURFACES
+from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.weierstrass import CORNER
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -14,13 +14,13 @@ from build123d import BuildPart
 import gyroid_cad.cq_plugin  # noqa: F401 (adds Workplane.gyroid)
 from gyroid_cad import Cylinder, FitSettings, Lattice, fill, write_volumes
 from gyroid_cad.bd_objects import Gyroid
-from gyroid_cad.cli import main
+from gyroid_cad.builds.meshes import mesh_quality
+from gyroid_cad.cli.app import main
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.families import SURFACES
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.step import read_step
-from gyroid_cad.mesh.places import FREE_WALLS
-from gyroid_cad.meshing import mesh_quality
+from gyroid_cad.mesh.nodes import FREE_WALLS
+from gyroid_cad.surface.families import SURFACES
 
 SIZE = 10.0
 NAMES = pytest.mark.parametrize("name", SURFACES)

@@ -23,10 +23,10 @@ from OCP.TopLoc import TopLoc_Location
 
 from gyroid_cad import Lattice
 from gyroid_cad.errors import FitError, GyroidError, ParameterError
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import FitSettings
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.step import read_step
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings
 
 TUBE = USUAL.tube
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from patches import STEPS, cell_sheets
 
 from gyroid_cad import Lattice
-from gyroid_cad.bounding_cells import bounding_cell
-from gyroid_cad.complex import build_complex
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import fit_patch
-from gyroid_cad.mesh.hexahedra import Mesh, hexahedra
-from gyroid_cad.symmetry import QUARTER
-from gyroid_cad.wall import build_wall
+from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra
+from gyroid_cad.surface.bounding_cells import bounding_cell
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.symmetry import QUARTER
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.offset import build_wall
 
 # The paper's example, in bounding-cell lengths; it does not say how thick the wall is.
 CELLS, CELL_SIZE, THICKNESS = (4, 3, 2), 2.0, 0.2

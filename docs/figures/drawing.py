@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
-from gyroid_cad.mesh.hexahedra import Mesh
-from gyroid_cad.nurbs import NurbsSurface
+from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.nurbs.surface import NurbsSurface
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -10,7 +10,7 @@ import vtk
 from drawing import GREY, Floats, Sheet
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
-from gyroid_cad.patch import smooth
+from gyroid_cad.surface.patch import smooth
 
 # What brings the exact patch, centred at the origin, onto the level set: a half-turn about x, after a translation in
 # bounding-cell lengths, which are pi.

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from patches import STEPS
 
 from gyroid_cad import Lattice
-from gyroid_cad.mesh.hexahedra import Mesh
-from gyroid_cad.mesh.quality import element_measures
+from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.mesh.finite_elements.quality import element_measures
 
 _LAYERS = 3
 # From a scaled Jacobian of 0.75 to 1.

@@ -10,11 +10,11 @@ from drawing import ABOVE, GREY, SIX, Floats, Sheet, View, draw, sheet_of, surfa
 from level_set import level_set_sheet
 from plane import RAYS, RINGS, polar_grid
 
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import FitSettings, fit_patch
-from gyroid_cad.patch import polar
-from gyroid_cad.symmetry import QUARTER
-from gyroid_cad.weierstrass import points
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.patch import polar
+from gyroid_cad.surface.symmetry import QUARTER
+from gyroid_cad.surface.weierstrass import points
 
 # Elements along a patch's sides, as in the paper.
 STEPS = 20

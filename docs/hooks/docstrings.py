@@ -13,7 +13,7 @@ from typing import Any
 
 import griffe
 
-from gyroid_cad.families import USUAL
+from gyroid_cad.surface.families import USUAL
 
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr|data|exc):`(~?)([\w.]+)`")
 _SECTIONS = ("Parameters", "Attributes", "Raises")

@@ -8,8 +8,8 @@ from OCP.BRep import BRep_Builder
 from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS_Shape
 
+from gyroid_cad.common.files import replacing
 from gyroid_cad.errors import ExportError
-from gyroid_cad.files import replacing
 
 __all__ = ["read_brep", "write_brep"]
 

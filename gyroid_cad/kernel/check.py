@@ -26,7 +26,7 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
-from gyroid_cad.nurbs import NurbsSurface, grid_derivatives
+from gyroid_cad.nurbs.surface import NurbsSurface, grid_derivatives
 
 __all__ = ["Topology", "enclosed_volume", "is_valid", "parts_of", "topology"]
 

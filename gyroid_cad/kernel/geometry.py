@@ -8,7 +8,7 @@ from OCP.gp import gp_Dir2d, gp_Pnt2d, gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface
-from gyroid_cad.wall import Wall
+from gyroid_cad.wall.offset import Wall
 
 __all__ = ["TOLERANCE", "WallGeometry", "parameter_line"]
 

@@ -25,9 +25,9 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
-from gyroid_cad.box_cut import Box
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.trim.box import Box
 
 __all__ = ["Part", "measure", "require_part"]
 

@@ -15,7 +15,7 @@ from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 
-from gyroid_cad.checks import three_numbers
+from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.part import Part

@@ -30,8 +30,8 @@ from OCP.TopoDS import (
 
 from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry, parameter_line
 from gyroid_cad.kernel.surfaces import kernel_curve
-from gyroid_cad.nurbs import NurbsCurve
-from gyroid_cad.wall import SIDES, Wall
+from gyroid_cad.nurbs.surface import NurbsCurve
+from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = [
     "TOLERANCE",

@@ -18,9 +18,9 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Wr
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
 
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
-from gyroid_cad.files import replacing
-from gyroid_cad.formats import require_schema
 from gyroid_cad.kernel.step_text import compact_step
 from gyroid_cad.version import __version__
 

@@ -23,9 +23,9 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError
-from gyroid_cad.files import replacing
-from gyroid_cad.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.kernel.solid import TOLERANCE
 
 __all__ = ["diagonal", "meshed", "write_stl"]

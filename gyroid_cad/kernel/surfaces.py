@@ -11,7 +11,7 @@ from OCP.gp import gp_Pnt
 from OCP.TColgp import TColgp_Array1OfPnt, TColgp_Array2OfPnt
 from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
-from gyroid_cad.nurbs import NurbsCurve, NurbsSurface
+from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
 
 __all__ = ["kernel_curve", "kernel_knots", "kernel_surface", "nurbs_of_surface"]
 

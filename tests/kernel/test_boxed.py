@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyroid_cad.box_cut import Box, BoxedWall, cut_to_box
-from gyroid_cad.covering import AT_HOME, covering_complex, periodic_offsets
 from gyroid_cad.errors import KernelError
-from gyroid_cad.fit import FitSettings, FittedPatch, fit_patch
-from gyroid_cad.kernel.boxed import hollowed_by, realise_boxed
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.split import compound_of
-from gyroid_cad.wall import build_wall
+from gyroid_cad.kernel.trimmed import hollowed_by, realise_boxed
+from gyroid_cad.surface.fit import FitSettings, FittedPatch, fit_patch
+from gyroid_cad.trim.box import Box, BoxedWall, cut_to_box
+from gyroid_cad.wall.covering import AT_HOME, covering_complex, periodic_offsets
+from gyroid_cad.wall.offset import build_wall
 
 Floats = NDArray[np.float64]
 

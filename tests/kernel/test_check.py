@@ -19,13 +19,13 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
-from gyroid_cad.complex import build_complex
 from gyroid_cad.errors import KernelError
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.check import Topology, enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.solid import realise
-from gyroid_cad.wall import build_wall
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.offset import build_wall
 
 TUBE = USUAL.tube
 

@@ -18,18 +18,18 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
-from gyroid_cad.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
 from gyroid_cad.errors import KernelError
-from gyroid_cad.fit import FitSettings, fit_patch
-from gyroid_cad.kernel import finding, regional
+from gyroid_cad.kernel import region_split, regions
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.regional import split_by_region
+from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import hollow
 from gyroid_cad.kernel.solid import realise_faces
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
-from gyroid_cad.wall import build_wall
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.wall.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.offset import build_wall
 
 Floats = NDArray[np.float64]
 Faces = list[TopoDS_Face]
@@ -89,14 +89,14 @@ def subject(name: str) -> tuple[Part, Faces, Faces]:
 
 @pytest.fixture(autouse=True)
 def _small_regions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(finding, "FACES_OF_REGION", 20)
-    monkeypatch.setattr(regional, "_FEW", 20)
+    monkeypatch.setattr(region_split, "FACES_OF_REGION", 20)
+    monkeypatch.setattr(regions, "_FEW", 20)
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_solids_are_those_of_splitting_at_once(name: str, tmp_path: Path) -> None:
     part, cut, whole = subject(name)
-    assert len(finding.Task(part, cut).regions) > 2
+    assert len(region_split.Task(part, cut).regions) > 2
     ours, theirs = split_by_region(part, cut, 2), split(part, cut)
     assert len(ours.inside) == len(theirs.inside)
     assert ours.origins == theirs.origins
@@ -168,7 +168,7 @@ def test_what_goes_wrong_in_a_process_is_an_error_of_the_kernel(
     happens: Callable[..., NoReturn], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part, cut, _ = subject("ball")
-    monkeypatch.setattr(finding.Finding, "found", happens)
+    monkeypatch.setattr(region_split.Finding, "found", happens)
     with pytest.raises(KernelError, match=said):
         split_by_region(part, cut, 2)
 
@@ -178,10 +178,10 @@ def test_else_all_is_split_at_once(why: str, monkeypatch: pytest.MonkeyPatch) ->
     part, cut, _ = subject("ball")
     told: list[tuple[int, int]] = []
     made = Pieces((), ())
-    monkeypatch.setattr(regional, "ProcessPoolExecutor", fails)
-    monkeypatch.setattr(regional, "split", lambda part, faces: made)
+    monkeypatch.setattr(regions, "ProcessPoolExecutor", fails)
+    monkeypatch.setattr(regions, "split", lambda part, faces: made)
     if why == "no fork":
-        monkeypatch.setattr(regional.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+        monkeypatch.setattr(regions.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
     faces = cut[:10] if why == "few faces" else cut
     processes = 1 if why == "one process" else 2
     assert split_by_region(part, faces, processes, lambda *done: told.append(done)) is made

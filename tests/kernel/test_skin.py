@@ -17,9 +17,7 @@ from scipy.spatial import cKDTree
 
 import gyroid_cad.kernel.core
 import gyroid_cad.kernel.offset
-from gyroid_cad.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
@@ -28,7 +26,9 @@ from gyroid_cad.kernel.skin import Hollow, hollow, openings_of
 from gyroid_cad.kernel.solid import realise_faces
 from gyroid_cad.kernel.split import bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
-from gyroid_cad.wall import build_wall
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.wall.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.offset import build_wall
 
 Floats = NDArray[np.float64]
 

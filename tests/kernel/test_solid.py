@@ -32,16 +32,16 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
-from gyroid_cad.bounding_cells import bounding_cell
-from gyroid_cad.complex import build_complex
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.check import enclosed_volume, topology
 from gyroid_cad.kernel.solid import TOLERANCE, another_handle, realise
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.patch import smooth
-from gyroid_cad.symmetry import CELL_QUARTERS, QUARTER, Placements
-from gyroid_cad.wall import SIDES, Wall, build_wall
+from gyroid_cad.surface.bounding_cells import bounding_cell
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.patch import smooth
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.offset import SIDES, Wall, build_wall
 
 TUBE = USUAL.tube
 

@@ -14,15 +14,15 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
 from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
-from gyroid_cad.complex import build_complex
-from gyroid_cad.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
 from gyroid_cad.errors import KernelError
-from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure, require_part
 from gyroid_cad.kernel.solid import realise, realise_faces
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
-from gyroid_cad.wall import build_wall
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.offset import build_wall
 
 Floats = NDArray[np.float64]
 

@@ -15,18 +15,18 @@ from OCP.Message import Message
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial import cKDTree
 
-from gyroid_cad.complex import build_complex
+from gyroid_cad.common.formats import SCHEMAS, require_schema
 from gyroid_cad.errors import ExportError, ParameterError
-from gyroid_cad.families import USUAL
-from gyroid_cad.fit import FitSettings, fit_patch
-from gyroid_cad.formats import SCHEMAS, require_schema
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.solid import TOLERANCE, realise
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.limits import LARGEST_CELL, SMALLEST_CELL
-from gyroid_cad.symmetry import CELL_QUARTERS
-from gyroid_cad.wall import build_wall
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.symmetry import CELL_QUARTERS
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.limits import LARGEST_CELL, SMALLEST_CELL
+from gyroid_cad.wall.offset import build_wall
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
 

@@ -17,14 +17,14 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError, ParameterError
-from gyroid_cad.fit import FitSettings
-from gyroid_cad.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.kernel.check import enclosed_volume
 from gyroid_cad.kernel.stl import meshed as triangles_of
 from gyroid_cad.kernel.stl import write_stl
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.wall import SIDES
+from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.wall.offset import SIDES
 
 Floats = NDArray[np.float64]
 

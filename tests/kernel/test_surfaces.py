@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineSurface
 from OCP.gp import gp_Pnt, gp_Vec
 
-from gyroid_cad.fit import FitSettings, fit_patch
 from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface, nurbs_of_surface
-from gyroid_cad.nurbs import NurbsCurve, NurbsSurface
+from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
+from gyroid_cad.surface.fit import FitSettings, fit_patch
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gyroid_cad.complex import build_complex
-from gyroid_cad.exact_wall import patch_points
-from gyroid_cad.mesh.places import patch_places, place_count
+from gyroid_cad.mesh.nodes import patch_places, place_count
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.exact import patch_points
 
 sides = st.integers(1, 3)
 

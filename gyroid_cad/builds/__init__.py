@@ -1,0 +1,1 @@
+"""A lattice made: its solid, triangles, assembly and meshes, with their reports."""

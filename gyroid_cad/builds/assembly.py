@@ -1,0 +1,202 @@
+"""One cell and the places where it stands, instead of one solid of all of them: files of a few bytes a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gyroid_cad.builds.solid import Build, build
+from gyroid_cad.common.formats import FORMATS
+from gyroid_cad.common.memory import require_memory
+from gyroid_cad.common.progress import Progress
+from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.wall.fitted import Recipe
+
+if TYPE_CHECKING:
+    from gyroid_cad.kernel.assembly import NamedPart, Place
+
+__all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report", "require_assembly_formats"]
+
+PART_NAME = "CC"
+# Peak memory of an occurrence in the kernel's document and its writer, as measured, rounded up.
+_BYTES_PER_INSTANCE = 10_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assembly:
+    """A cell as a closed solid of its own, and the block that its translates make up.
+
+    Every cell ends in side walls of its own: neighbours touch in them and are not fused.
+
+    Attributes
+    ----------
+    cells : tuple of int
+        How often the cell stands along x, y, z.
+    cell_size : float
+        How far apart, in mm.
+    cell : Build
+        Of the one cell, with its solid.
+    """
+
+    cells: tuple[int, int, int]
+    cell_size: float
+    cell: Build
+
+    def places(self) -> Iterator[Place]:
+        """Name, ``CC_i_j_k`` counted from 1, and translation in mm of every cell."""
+        for x, y, z in np.ndindex(self.cells):
+            yield (
+                f"{PART_NAME}_{x + 1}_{y + 1}_{z + 1}",
+                (x * self.cell_size, y * self.cell_size, z * self.cell_size),
+            )
+
+    def part(self) -> NamedPart:
+        """The cell with names and colours of its faces.
+
+        As in the paper's Fig. 11 a semi-fundamental patch (SFP) is yellow, the bounding cell (BC) it belongs to
+        red and the cubic cell (CC) green. A face is called ``BC_b_SFP_p_side_s``, with side 0 or 1 of the wall, or
+        ``BC_b_SFP_p_edge_k`` where it goes through the wall along edge k of the patch.
+        """
+        from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart
+        from gyroid_cad.kernel.solid import faces_by_patch
+
+        solid, complex = self.cell.solid(), self.cell.laid.complex
+        bounding_cell = complex.placements.bounding_cell[complex.patch_placement].tolist()
+        free = complex.free[complex.patch_edges]
+        faces = []
+        for patch, some in enumerate(faces_by_patch(solid, self.cell.laid.wall)):
+            group = bounding_cell[patch]
+            colour = YELLOW if patch == 0 else RED if group == bounding_cell[0] else GREEN
+            name = f"BC_{group + 1}_SFP_{bounding_cell[:patch].count(group) + 1}"
+            kinds = ["side_0", "side_1", *(f"edge_{k + 1}" for k in np.flatnonzero(free[patch]))]
+            faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
+        return NamedPart(solid, PART_NAME, GREEN, faces)
+
+    def write(self, targets: Sequence[Path], schema: str = "ap214", progress: Progress | None = None) -> None:
+        """Write STEP assemblies.
+
+        Raises
+        ------
+        ParameterError
+            If a file's ending is none of STEP's, or memory would not do.
+        KernelError
+            If the kernel finds the cell invalid: then nothing is written.
+        ExportError
+        """
+        from gyroid_cad.kernel.assembly import write_assembly
+
+        require_assembly_formats(targets)
+        require_memory(self.cells, _BYTES_PER_INSTANCE)
+        if not self.cell.valid(progress):
+            raise KernelError("the kernel finds the solid of one cell invalid; nothing was written")
+        part = self.part()
+        for path in targets:
+            with self.cell.timed(f"write {path.name}", progress):
+                write_assembly(part, self.places(), path, schema)
+
+
+@dataclass(frozen=True, slots=True)
+class AssemblyReport:
+    """What an assembly is.
+
+    Attributes
+    ----------
+    cells : tuple of int
+    cell_size, thickness : float
+        In mm.
+    density : float
+        Volume fraction.
+    instances : int
+        How often the cell stands in it.
+    faces : int
+        Of the cell.
+    valid, closed : bool
+        The cell, by the kernel's own check; every edge bounds exactly two faces.
+    volume, volume_exact : float
+        In mm3, of all cells: enclosed by the kernel's faces, and by the tube formula.
+    seconds : dict
+        By stage.
+    """
+
+    cells: tuple[int, int, int]
+    cell_size: float
+    thickness: float
+    density: float
+    instances: int
+    faces: int
+    valid: bool
+    closed: bool
+    volume: float
+    volume_exact: float
+    seconds: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain values, ready for JSON."""
+        return asdict(self)
+
+
+def assembly(recipe: Recipe, progress: Progress | None = None) -> Assembly:
+    """The assembly of a lattice of whole cells that are all alike.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    ParameterError
+        If its cells differ, or are cut.
+    FitError, KernelError
+        As of the solid of one cell.
+    """
+    if not recipe.grading.uniform or recipe.boxed:
+        raise ParameterError(
+            "instances", True, "a lattice whose cells are all alike and not trimmed: its one cell stands for all"
+        )
+    one = build(replace(recipe, cells=(1, 1, 1)), progress)
+    return Assembly(recipe.cells, recipe.grading.cell_size, one)
+
+
+def assembly_report(made: Assembly, thickness: float, density: float, volume_exact: float) -> AssemblyReport:
+    """The report on an assembly.
+
+    Parameters
+    ----------
+    made : Assembly
+    thickness, density, volume_exact : float
+        Of the exact lattice.
+    """
+    count = prod(made.cells)
+    return AssemblyReport(
+        cells=made.cells,
+        cell_size=made.cell_size,
+        thickness=thickness,
+        density=density,
+        instances=count,
+        faces=made.cell.topology.faces,
+        valid=made.cell.valid(),
+        closed=made.cell.topology.closed,
+        volume=count * made.cell.volume,
+        volume_exact=volume_exact,
+        seconds=dict(made.cell.seconds),
+    )
+
+
+def require_assembly_formats(targets: Sequence[Path]) -> None:
+    """Check that files can hold an assembly: STEP only.
+
+    Raises
+    ------
+    ParameterError
+    """
+    endings = [ending for ending, form in FORMATS.items() if form == "step"]
+    for path in targets:
+        if path.suffix.lower() not in endings:
+            raise ParameterError("output", str(path), f"a name ending in {' or '.join(endings)} for an assembly")

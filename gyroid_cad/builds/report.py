@@ -1,0 +1,117 @@
+"""What a lattice turned out to be, as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from gyroid_cad.builds.solid import Build
+from gyroid_cad.surface.fit import fit_patch, fit_report
+
+__all__ = ["LatticeReport", "report_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeReport:
+    """What was built, and how exactly.
+
+    Attributes
+    ----------
+    cells : tuple of int
+    cell_size : float
+        In mm, before any map.
+    thickness, thinnest, thickest : float
+        Whole wall in mm: its mean over the mid-surface and its extremes.
+    density : float
+        Volume fraction: of a cell, or of the mapped block where the lattice varies.
+    patches, faces, solids : int
+    control_points : int
+        Along each side of a patch.
+    valid, closed : bool
+        By the kernel's own check; every edge bounds exactly two faces.
+    free_edges : int
+        Mid-surface edges that bound one patch only: each carries a ruled side wall.
+    pinch_lines : int
+        Lines through the wall in which patches touch without joining.
+    volume, volume_exact : float
+        In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
+        where the lattice varies; the latter none of a lattice that varies and is cut.
+    max_deviation : float
+        In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice varies.
+    max_wall_error : float, optional
+        Relative, of the wall along the exact normal; where the lattice varies.
+    max_normal_angle : float
+        In degrees, between fitted and exact normal of the mid-surface.
+    samples_per_patch : dict
+        At how many places of every patch deviation, folding and clearance between walls were checked; empty where
+        they hold in closed form.
+    seconds : dict
+        By stage.
+    """
+
+    cells: tuple[int, int, int]
+    cell_size: float
+    thickness: float
+    thinnest: float
+    thickest: float
+    density: float
+    patches: int
+    faces: int
+    solids: int
+    control_points: int
+    valid: bool
+    closed: bool
+    free_edges: int
+    pinch_lines: int
+    volume: float
+    volume_exact: float | None
+    max_deviation: float
+    max_wall_error: float | None
+    max_normal_angle: float
+    samples_per_patch: dict[str, int]
+    seconds: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain values, ready for JSON."""
+        return asdict(self)
+
+
+def report_of(built: Build, thickness: float, density: float, volume_exact: float | None) -> LatticeReport:
+    """The report on what was built and checked.
+
+    Parameters
+    ----------
+    built : Build
+    thickness, density : float
+        Of the exact lattice.
+    volume_exact : float, optional
+        Of the exact lattice, if it is known.
+    """
+    laid = built.laid
+    refit, complex, recipe = laid.refit, laid.complex, laid.recipe
+    with built.timed("fit report"):
+        fit = fit_report(fit_patch(recipe.settings, recipe.grading.surface.family))
+    cell_size = recipe.grading.cell_size
+    return LatticeReport(
+        cells=built.cells,
+        cell_size=cell_size,
+        thickness=thickness,
+        thinnest=refit.thinnest if refit else thickness,
+        thickest=refit.thickest if refit else thickness,
+        density=density,
+        patches=built.patches,
+        faces=built.topology.faces,
+        solids=built.topology.solids,
+        control_points=len(laid.wall.weights),
+        valid=built.valid(),
+        closed=built.topology.closed,
+        free_edges=0 if recipe.boxed else int(complex.free.sum()),
+        pinch_lines=0 if recipe.boxed else complex.pinch_lines,
+        volume=built.volume,
+        volume_exact=volume_exact,
+        max_deviation=refit.max_deviation if refit else fit.max_distance * cell_size,
+        max_wall_error=refit.max_wall_error if refit else None,
+        max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,
+        samples_per_patch=laid.samples_per_patch,
+        seconds=dict(built.seconds),
+    )

@@ -1,0 +1,243 @@
+"""From numbers to a checked solid and its files, stage by stage, timed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gyroid_cad.common.cache import Remembered
+from gyroid_cad.common.formats import FORMATS, require_meshing, require_schema
+from gyroid_cad.common.memory import require_memory
+from gyroid_cad.common.progress import Progress, tell, timed
+from gyroid_cad.errors import KernelError
+from gyroid_cad.trim.box import Box, cut_to_box
+from gyroid_cad.wall.covering import PHASES
+from gyroid_cad.wall.fitted import LaidWall, Recipe, laid_wall
+
+if TYPE_CHECKING:
+    from gyroid_cad.kernel.solid import KernelShape
+
+__all__ = [
+    "Build",
+    "build",
+    "require_settings",
+    "write_shape",
+]
+
+# Peak memory a cell, as benchmarks/memory.py measures it, rounded up.
+_SOLID_BYTES_PER_CELL = 1_500_000
+_FILE_BYTES_PER_CELL = 6_000_000
+# Volume in the kernel against that of the nets it was given: rounding only.
+_VOLUME_AGREEMENT = 1e-9
+# Of cut cells against whole ones: how closely the section curves are fitted.
+_BOXED_VOLUME_AGREEMENT = 1e-5
+
+
+class Build:
+    """A lattice's solid, checked closed and full, with the seconds each stage took.
+
+    Attributes
+    ----------
+    laid : LaidWall
+        The wall it is made of.
+    topology : Topology
+    volume : float
+        In mm3, from the control points the kernel holds.
+    patches : int
+    shift : tuple of float
+        Of the lattice in its box, in mm, where it could not be cut without.
+    seconds : dict
+        By stage.
+    """
+
+    def __init__(self, laid: LaidWall, progress: Progress | None) -> None:
+        self.laid = laid
+        self.seconds = dict(laid.seconds)
+        self._valid: bool | None = None
+        self.shift = (0.0, 0.0, 0.0)
+        self._require_memory(_SOLID_BYTES_PER_CELL)
+        with self.timed("kernel", progress):
+            from gyroid_cad.kernel.check import enclosed_volume, topology
+            from gyroid_cad.kernel.solid import realise
+        wall = laid.wall
+        if laid.recipe.boxed:
+            self._shape, self.volume, self.patches = self._boxed(progress)
+            expected, agreement = self._volume_in_box(), _BOXED_VOLUME_AGREEMENT
+        else:
+            with self.timed("solid", progress):
+                self._shape = realise(wall, lambda done, total: tell(progress, "solid", done, total))
+            self.volume, self.patches = enclosed_volume(self._shape), laid.complex.patch_count
+            expected, agreement = wall.volume(), _VOLUME_AGREEMENT
+        with self.timed("check", progress):
+            self.topology = topology(self._shape)
+            self._require_closed_and_full(expected, agreement)
+
+    @property
+    def cells(self) -> tuple[int, int, int]:
+        return self.laid.recipe.cells
+
+    def _boxed(self, progress: Progress | None) -> tuple[KernelShape, float, int]:
+        """The shape cut to the block of cells, its volume, and how many patches are in it."""
+        from gyroid_cad.kernel.split import compound_of
+        from gyroid_cad.kernel.trimmed import realise_boxed
+
+        size = self.laid.recipe.grading.cell_size
+        box = Box(np.eye(3), np.zeros(3), np.array(self.cells) * size)
+        problem: KernelError | None = None
+        for phase in PHASES:
+            shift = np.array(phase) * size
+            try:
+                with self.timed("cut", progress):
+                    # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
+                    left = cut_to_box(self.laid.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True)
+                with self.timed("solid", progress):
+                    solids = realise_boxed(left)
+            except KernelError as failed:
+                problem = problem or failed
+                continue
+            self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
+            shape = solids[0] if len(solids) == 1 else compound_of(solids)
+            return shape, float(left.volumes.sum()), len({face.patch for face in left.faces})
+        raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
+
+    def _volume_in_box(self) -> float | None:
+        """Of whole cells, all alike; none where they vary."""
+        if not self.laid.recipe.grading.uniform:
+            return None
+        cell = np.unique(self.laid.wall.patch_net, return_index=True)[1]
+        return prod(self.cells) * self.laid.wall.volume(cell)
+
+    @contextmanager
+    def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
+        """Tell that a stage begins and ends, and add the seconds between."""
+        with timed(self.seconds, stage, progress):
+            yield
+
+    def solid(self) -> KernelShape:
+        """A shape of the caller's own, to move as they like, that shares the geometry."""
+        from gyroid_cad.kernel.solid import another_handle
+
+        return another_handle(self._shape)
+
+    def valid(self, progress: Progress | None = None) -> bool:
+        """Whether the kernel's own check, asked once, finds the solid valid."""
+        if self._valid is None:
+            from gyroid_cad.kernel.check import is_valid
+
+            with self.timed("check", progress):
+                self._valid = is_valid(self._shape)
+        return self._valid
+
+    def write(
+        self, targets: Sequence[Path], schema: str, deviation: float, angle: float, progress: Progress | None = None
+    ) -> None:
+        """Write the solid to each target in the format of its ending.
+
+        Raises
+        ------
+        KernelError
+            If the kernel finds the solid invalid: then nothing is written.
+        ExportError
+        """
+        self._require_memory(_FILE_BYTES_PER_CELL)
+        if not self.valid(progress):
+            raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
+        for path in targets:
+            with self.timed(f"write {path.name}", progress):
+                write_shape(self._shape, path, schema, deviation, angle, cut=self.laid.recipe.boxed)
+
+    def _require_memory(self, bytes_per_cell: int) -> None:
+        require_memory(self.cells, bytes_per_cell, len(self.laid.wall.weights))
+
+    def _require_closed_and_full(self, expected: float | None, agreement: float) -> None:
+        if not self.topology.closed:
+            raise KernelError(
+                f"the kernel's shape of {self.cells} cells is not closed: "
+                f"{self.topology.open_edges} edges do not bound exactly two faces"
+            )
+        if expected is not None and not abs(self.volume - expected) <= agreement * expected:
+            raise KernelError(
+                f"the kernel's shape of {self.cells} cells encloses {self.volume:.9g} mm3, "
+                f"its control nets {expected:.9g} mm3"
+            )
+
+
+def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, angle: float, cut: bool = False) -> None:
+    """Write a shape, whose faces may have been cut, in the format of the path's ending.
+
+    Raises
+    ------
+    ExportError
+    """
+    from gyroid_cad.kernel.brep import write_brep
+    from gyroid_cad.kernel.step import write_step
+    from gyroid_cad.kernel.stl import meshed, write_stl
+    from gyroid_cad.mesh.triangles.three_mf import write_3mf
+
+    match FORMATS[path.suffix.lower()]:
+        case "step":
+            write_step(shape, path, schema, parameter_curves=cut)
+        case "brep":
+            write_brep(shape, path)
+        case "stl":
+            write_stl(shape, path, deviation, angle)
+        case _:
+            write_3mf(*meshed(shape, path, deviation, angle), path)
+
+
+_builds: Remembered[Recipe, Build] = Remembered()
+
+
+def build(recipe: Recipe, progress: Progress | None = None) -> Build:
+    """The build of a lattice; the last few are remembered.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    ParameterError
+        If memory would not do, saying how much it would take.
+    FitError
+        If the fit's edges do not meet those of its neighbours.
+    KernelError
+        If the kernel's shape is not closed or does not enclose the right volume.
+    """
+
+    def made() -> Build:
+        require_memory(recipe.cells, _SOLID_BYTES_PER_CELL, recipe.settings.control_points)
+        return Build(laid_wall(recipe, progress), progress)
+
+    return _builds.get(recipe, made)
+
+
+def require_settings(
+    cells: tuple[int, int, int], schema: str, deviation: float | None, angle: float, solid: bool = True
+) -> None:
+    """Check the settings of files to be written, and that memory will do, before anything is built.
+
+    Parameters
+    ----------
+    cells : tuple of int
+    schema : str
+    deviation : float, optional
+    angle : float
+    solid : bool
+        Whether there is a solid to be written; triangles of a wall are streamed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    require_schema(schema)
+    require_meshing(1.0 if deviation is None else deviation, angle)
+    if solid:
+        require_memory(cells, _FILE_BYTES_PER_CELL)

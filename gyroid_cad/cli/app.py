@@ -1,0 +1,247 @@
+"""The command line: parse, describe the lattice, build, write, print. No geometry."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gyroid_cad.cli.completion import answered_shell, completion_command
+from gyroid_cad.cli.console import print_built, print_check_table, print_table, shown_progress
+from gyroid_cad.cli.doctor import doctor_command, version_option
+from gyroid_cad.cli.fill import fill_command
+from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, option_name, printed_options
+from gyroid_cad.cli.mesh import mesh_command, volumes_command
+from gyroid_cad.cli.print_check import print_check_command
+from gyroid_cad.cli.report import report_command
+from gyroid_cad.cli.view import view_command
+from gyroid_cad.common.files import file_sizes
+from gyroid_cad.errors import GyroidError, ParameterError
+
+if TYPE_CHECKING:
+    from gyroid_cad.builds.assembly import AssemblyReport
+    from gyroid_cad.builds.triangles import TriangleReport
+    from gyroid_cad.lattice import LatticeReport
+
+__all__ = ["main"]
+
+PROGRAM = "gyroid-cad"
+# Those that are no options.
+_ARGUMENTS = ("config", "file", "part")
+DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@version_option
+def commands() -> None:
+    """The gyroid as exact-grade CAD solids. Lengths are in millimetres, angles in degrees.
+
+    \b
+    gyroid-cad build -o part.step --cells 2 2 2 --cell-size 10 --thickness 0.8
+    gyroid-cad doctor
+    """
+
+
+@commands.command()
+@click.option(
+    "-o",
+    "--output",
+    multiple=True,
+    metavar="FILE",
+    help=".step, .stp, .brep, .stl or .3mf; may be repeated. For .stl and .3mf of whole patches no solid is built.",
+)
+@lattice_options
+@click.option(
+    "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
+)
+@click.option(
+    "--instances",
+    is_flag=True,
+    help="Write .step as an assembly: one cell and its places, named and coloured. Hundreds of times smaller, to look "
+    "at and lay out; the cells touch and are not fused. Of cells that are all alike and not trimmed.",
+)
+@click.option(
+    "--deviation",
+    type=float,
+    metavar="MM",
+    help="Of the triangles in .stl and .3mf; a thousandth of the cell size if left out, or a tenth of a thin wall.",
+)
+@click.option(
+    "--angle",
+    type=float,
+    default=15.0,
+    show_default=True,
+    metavar="DEGREES",
+    help="Between triangles of a lattice cut with --trim; those of whole patches keep to the deviation alone.",
+)
+@click.option("--printer", metavar="NAME|FILE.toml", help="Check as well whether it can make this, such as form2.")
+@click.option("--print-config", is_flag=True, help="Print the lattice as TOML, ready for LATTICE.toml; build nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
+    """Build a lattice as a closed solid, or as triangles, and write it.
+
+    Expressions are of x, y and z in mm, of places in the lattice before anything is moved; pi and functions
+    such as sqrt, sin, exp and minimum are known. A TOML file has these options as keys, with underscores;
+    options given as well override it.
+
+    \b
+    gyroid-cad build -o part.step -o part.stl --cells 2 2 2 --cell-size 10 --thickness 0.8
+    gyroid-cad build -o print.stl -o print.3mf --cells 8 8 8 --cell-size 5 --density 0.2 --deviation 0.02
+    gyroid-cad build -o many.step --instances --cells 20 20 20 --cell-size 5 --density 0.2
+    gyroid-cad build -o part.step --cells 3 3 1 --cell-size 10 --thickness "0.6 + 0.04*x"
+    gyroid-cad build -o block.step --cells 5 5 5 --cell-size 7 --density 0.3 --trim box
+    gyroid-cad build -o ring.step --cells 12 2 1 --cell-size 10 --density 0.2 --map cylinder:radius=20,angle=360
+    gyroid-cad build -o print.stl --cells 4 4 4 --cell-size 12 --thickness 0.8 --printer form2
+    gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
+    """
+    start = time.perf_counter()
+    if not (given["output"] or print_config):
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    lattice = lattice_of(given)
+    if print_config:
+        click.echo(printed_options(), nl=False)
+        return
+    outputs, printer = given["output"], given["printer"]
+    if printer is not None:
+        from gyroid_cad.printing.print_check import print_check
+        from gyroid_cad.printing.printers import printer_named
+
+        printer = printer_named(printer)
+    settings = {name: given[name] for name in ("schema", "deviation", "angle", "instances")}
+    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
+        lattice.write(*outputs, **settings, progress=progress)
+        report: AssemblyReport | LatticeReport | TriangleReport
+        if given["instances"]:
+            report = lattice.assembly_report(progress)
+        elif lattice.needs_solid(outputs):
+            report = lattice.report(progress)
+        else:
+            report = lattice.triangle_report(given["deviation"], progress)
+        check = None if printer is None else print_check(lattice, printer, given["deviation"], progress)
+    summary = _summary(report, outputs, time.perf_counter() - start)
+    if check is not None:
+        summary["print_check"] = check.as_dict()
+    if as_json:
+        click.echo(json.dumps(summary))
+    elif not quiet:
+        print_built(summary)
+        if check is not None:
+            print_check_table(check)
+
+
+for _command in (
+    *(fill_command, mesh_command, volumes_command, view_command, print_check_command),
+    *(report_command, doctor_command, completion_command),
+):
+    commands.add_command(_command)
+
+
+@commands.command("fit-report")
+@click.option(
+    "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of our fit, along a side."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+def fit_report_command(control_points: int, as_json: bool) -> None:
+    """What our fit and the paper's are worth, side by side.
+
+    \b
+    gyroid-cad fit-report
+    gyroid-cad fit-report --control-points 14 --json
+    """
+    from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+
+    reports = {
+        "smooth": asdict(fit_report(fit_patch(FitSettings(control_points)))),
+        "paper": asdict(fit_report(fit_patch(FitSettings.paper()))),
+    }
+    if as_json:
+        click.echo(json.dumps(reports))
+        return
+    labels = {
+        "max_distance": "largest distance along the normal / L",
+        "rms_distance": "rms distance along the normal / L",
+        "max_normal_angle": "largest angle between normals, degrees",
+        "max_mean_curvature": "largest mean curvature x L (exact: 0)",
+        "rms_mean_curvature": "rms mean curvature x L",
+        "edge_gap": "gap between an edge and its neighbour's / L",
+        "corner_error": "corners off by / L",
+    }
+    rows = [(label, *(f"{report[key]:.2e}" for report in reports.values())) for key, label in labels.items()]
+    print_table(("L is the cell size", f"ours ({control_points} x {control_points})", "the paper's (10 x 10)"), rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        ``sys.argv[1:]`` if left out.
+
+    Returns
+    -------
+    int
+        0 done, 1 failed, 2 bad usage; an error is one line on stderr.
+    """
+    if (answered := answered_shell(commands, PROGRAM)) is not None:
+        return answered
+    try:
+        # Not commands.main: it would put an empty line before the one that says "interrupted".
+        with commands.make_context(PROGRAM, list(sys.argv[1:] if arguments is None else arguments)) as context:
+            commands.invoke(context)
+        status = DONE
+    except click.exceptions.Exit as left:
+        status = left.exit_code
+    except click.exceptions.NoArgsIsHelpError as shown:
+        click.echo(shown.format_message(), err=True)
+        status = BAD_USAGE
+    except click.ClickException as problem:
+        status = _fail(problem.format_message(), BAD_USAGE)
+    except ParameterError as problem:
+        status = _fail(_with_option_name(problem), BAD_USAGE)
+    except (click.Abort, KeyboardInterrupt):
+        status = _fail("interrupted", INTERRUPTED)
+    except Exception as problem:
+        if _was_interrupted(problem):
+            status = _fail("interrupted", INTERRUPTED)
+        elif isinstance(problem, GyroidError):
+            status = _fail(str(problem), FAILED)
+        else:  # a defect of ours is still one line for the user
+            status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
+    return status
+
+
+def _fail(message: str, status: int) -> int:
+    click.echo(f"{PROGRAM}: error: {' '.join(message.split())}", err=True)
+    return status
+
+
+def _was_interrupted(problem: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error: one that comes while the kernel is loaded ends as an ImportError."""
+    while problem is not None:
+        if isinstance(problem, KeyboardInterrupt):
+            return True
+        problem = problem.__cause__ or problem.__context__
+    return False
+
+
+def _with_option_name(problem: ParameterError) -> str:
+    if not problem.parameter.isidentifier() or problem.parameter in _ARGUMENTS:
+        return str(problem)
+    return str(problem).replace(problem.parameter, option_name(problem.parameter), 1)
+
+
+def _summary(
+    report: AssemblyReport | LatticeReport | TriangleReport, outputs: Sequence[str], total: float
+) -> dict[str, Any]:
+
+    summary = asdict(report)
+    summary["seconds"] = {stage: round(value, 4) for stage, value in {**report.seconds, "total": total}.items()}
+    summary["files"] = file_sizes(outputs)
+    return summary

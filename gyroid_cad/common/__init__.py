@@ -1,0 +1,1 @@
+"""Tools that know nothing of lattices: arrays, checks, a cache, files and their formats, progress."""

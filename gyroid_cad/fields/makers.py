@@ -1,0 +1,236 @@
+"""Fields ready to use: formulas, distances, gradients, samples, and blends of two fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gyroid_cad.common.checks import finite_number, finite_numbers, positive_number, three_numbers
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.field import Field, Floats, as_field, call_text, compiled_field, derived, shown
+
+__all__ = [
+    "between_planes",
+    "constant",
+    "distance_from_axis",
+    "distance_from_point",
+    "expression",
+    "linear",
+    "radial",
+    "sampled",
+    "smooth_maximum",
+    "smooth_minimum",
+]
+
+Point = tuple[float, float, float]
+
+
+def constant(value: float) -> Field:
+    """The same value everywhere; raises ParameterError if it is not a finite number."""
+    number = finite_number("value", value)
+    return Field(lambda x, y, z: number, call_text("constant", number), number)
+
+
+def linear(value: float, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Field:
+    """A value at the origin that changes by the slopes x, y, z per mm along the axes.
+
+    Raises
+    ------
+    ParameterError
+        If any of them is not a finite number.
+    """
+    origin = finite_number("value", value)
+    a, b, c = finite_number("x", x), finite_number("y", y), finite_number("z", z)
+    slopes = {name: slope for name, slope in zip("xyz", (a, b, c), strict=True) if slope}
+    text = call_text("linear", origin, **slopes)
+    return Field(lambda x, y, z: origin + a * x + b * y + c * z, text, None if slopes else origin)
+
+
+def expression(text: str) -> Field:
+    """A formula such as ``"0.8 - 0.1*z"``, as :func:`~gyroid_cad.fields.expressions.compile_expression` reads it.
+
+    The same text gives the same field. Raises ParameterError at what cannot be used, naming its column.
+    """
+    if not isinstance(text, str):
+        raise ParameterError("text", text, "an expression of x, y, z as text")
+    return compiled_field(text, "text")
+
+
+def distance_from_point(point: Point) -> Field:
+    """The distance in mm from a point; raises ParameterError if that isn't three finite numbers."""
+    centre = three_numbers("point", point)
+    return Field(_distance(centre), call_text("distance_from_point", centre))
+
+
+def distance_from_axis(point: Point, direction: Point) -> Field:
+    """The distance in mm from the line through a point along a direction.
+
+    Raises
+    ------
+    ParameterError
+        If either isn't three finite numbers, or the direction is zero.
+    """
+    through, along = three_numbers("point", point), three_numbers("direction", direction)
+    return Field(_distance(through, _unit("direction", along)), call_text("distance_from_axis", through, along))
+
+
+def radial(
+    centre_value: float,
+    outer_value: float,
+    radius: float,
+    centre: Point = (0.0, 0.0, 0.0),
+    axis: Point | None = None,
+) -> Field:
+    """A value that changes evenly with the distance from a point or an axis, and no more beyond a radius.
+
+    Parameters
+    ----------
+    centre_value, outer_value : float
+        At no distance; at the radius and beyond.
+    radius : float
+        In mm.
+    centre : tuple of float
+        In mm.
+    axis : tuple of float, optional
+        Direction of the line through the centre from which distances are taken instead.
+
+    Raises
+    ------
+    ParameterError
+        If anything isn't finite, the radius is not above 0 or the axis is zero.
+    """
+    values = finite_number("centre_value", centre_value), finite_number("outer_value", outer_value)
+    reach, middle = positive_number("radius", radius), three_numbers("centre", centre)
+    line = None if axis is None else three_numbers("axis", axis)
+    distance = _distance(middle, None if line is None else _unit("axis", line))
+    named = {"centre": middle if middle.any() else None, "axis": line}
+    text = call_text("radial", *values, reach, **{name: value for name, value in named.items() if value is not None})
+    return Field(lambda x, y, z: np.interp(distance(x, y, z), (0, reach), values), text)
+
+
+def between_planes(first_value: float, second_value: float, first_point: Point, second_point: Point) -> Field:
+    """A value that changes evenly from one plane to another parallel to it, and no more outside.
+
+    The planes go through the two points (in mm), perpendicular to the line that joins them.
+
+    Raises
+    ------
+    ParameterError
+        If anything isn't finite, or the points are the same.
+    """
+    values = finite_number("first_value", first_value), finite_number("second_value", second_value)
+    start, end = three_numbers("first_point", first_point), three_numbers("second_point", second_point)
+    length = float(np.linalg.norm(end - start))
+    if not 0 < length < inf:
+        raise ParameterError("second_point", second_point, f"another point than first_point, {shown(start)}")
+    unit = (end - start) / length
+    text = call_text("between_planes", *values, start, end)
+    return Field(lambda x, y, z: np.interp(unit @ _offsets(start, x, y, z), (0, length), values), text)
+
+
+def sampled(axes: Sequence[ArrayLike], values: ArrayLike, method: str | None = None) -> Field:
+    """A field through values on a grid; a point outside has the value of the nearest one on the border.
+
+    Parameters
+    ----------
+    axes : three array_like
+        Increasing coordinates in mm, at least two along each axis.
+    values : array_like, shape (len(axes[0]), len(axes[1]), len(axes[2]))
+    method : {"linear", "cubic"}, optional
+        Cubic where every axis has the four coordinates it needs, if left out. Cubic splines (not-a-knot) are
+        smooth, but may swing above and below the values they join.
+
+    Raises
+    ------
+    ParameterError
+    """
+    grid = _grid(axes)
+    shape = tuple(len(axis) for axis in grid)
+    heights = finite_numbers("values", values, f"finite numbers in the shape {shape} of the axes", shape)
+    allowed = ("linear", "cubic") if min(shape) >= 4 else ("linear",)
+    kind = allowed[-1] if method is None else method
+    if kind not in allowed:
+        raise ParameterError("method", method, "linear, or cubic with four coordinates or more along every axis")
+    try:
+        spline = _spline(grid, heights, 3 if kind == "cubic" else 1)
+    except ValueError:
+        raise ParameterError("axes", axes, "coordinates of less unlike steps, or the method linear") from None
+    lowest, highest = [axis[0] for axis in grid], [axis[-1] for axis in grid]
+    text = f"sampled({' x '.join(map(str, shape))} values, {kind!r})"
+    return Field(lambda x, y, z: spline(np.clip(np.stack((x, y, z), axis=-1), lowest, highest)), text)
+
+
+def smooth_minimum(first: Field | float | str, second: Field | float | str, width: float) -> Field:
+    """The lesser of two fields, with the crease where they cross rounded by a parabola.
+
+    Where they differ by the width or more it is the lesser itself, where they are equal a quarter of the width below.
+
+    Raises
+    ------
+    ParameterError
+        If the width is not above 0, or one of the two is neither a number, an expression nor a Field.
+    """
+    return _blend("smooth_minimum", 1.0, first, second, width)
+
+
+def smooth_maximum(first: Field | float | str, second: Field | float | str, width: float) -> Field:
+    """The greater of two fields, rounded as by :func:`smooth_minimum`."""
+    return _blend("smooth_maximum", -1.0, first, second, width)
+
+
+def _blend(name: str, sign: float, first: object, second: object, width: float) -> Field:
+    given = [as_field(*named, "one of the two to blend") for named in (("first", first), ("second", second))]
+    parts = tuple(part if isinstance(part, Field) else constant(part) for part in given)
+    reach = positive_number("width", width)
+
+    def blend(one: Floats, other: Floats) -> Floats:
+        overlap = np.maximum(1 - np.abs(one - other) / reach, 0)
+        lesser: Floats = np.minimum(sign * one, sign * other)
+        return sign * (lesser - overlap**2 * reach / 4)
+
+    return derived(blend, parts, call_text(name, *given, reach))
+
+
+def _unit(parameter: str, direction: Floats) -> Floats:
+    largest = np.abs(direction).max()
+    if not largest:
+        raise ParameterError(parameter, direction, "a direction, not zero")
+    # Scaled first: the squares of tiny and huge numbers are zero and infinite.
+    unit: Floats = direction / largest
+    return unit / np.linalg.norm(unit)
+
+
+def _offsets(start: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
+    return np.stack((x, y, z)) - start[:, np.newaxis]
+
+
+def _distance(start: Floats, unit: Floats | None = None) -> Callable[[Floats, Floats, Floats], Floats]:
+    """From a point, or from the line through it."""
+    across = np.eye(3) if unit is None else np.eye(3) - np.outer(unit, unit)
+    return lambda x, y, z: np.linalg.norm(across @ _offsets(start, x, y, z), axis=0)
+
+
+def _grid(axes: Sequence[ArrayLike]) -> list[Floats]:
+    accepted = "three vectors of increasing finite coordinates in mm, each at least two long"
+    if not isinstance(axes, Sequence | np.ndarray) or len(axes) != 3:
+        raise ParameterError("axes", axes, accepted)
+    grid = [finite_numbers("axes", axis, accepted) for axis in axes]
+    if any(axis.ndim != 1 or axis.size < 2 or not np.all(np.diff(axis) > 0) for axis in grid):
+        raise ParameterError("axes", axes, accepted)
+    return grid
+
+
+def _spline(grid: list[Floats], values: Floats, degree: int) -> Callable[[Floats], Floats]:
+    from scipy.interpolate import NdBSpline, make_interp_spline
+
+    # One axis after the other is exact; SciPy's interpolator of grids solves for all at once, to 1e-4 or so.
+    knots, coefficients = [], values
+    for number, axis in enumerate(grid):
+        along = make_interp_spline(axis, coefficients, k=degree, axis=number)
+        knots.append(along.t)
+        coefficients = np.moveaxis(along.c, 0, number)
+    spline: Callable[[Floats], Floats] = NdBSpline(tuple(knots), np.ascontiguousarray(coefficients), degree)
+    return spline

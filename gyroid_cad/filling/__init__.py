@@ -1,0 +1,1 @@
+"""A part filled with a lattice."""

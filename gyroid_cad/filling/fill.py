@@ -1,0 +1,384 @@
+"""Fill a part from CAD with gyroid: the wall, one of the two labyrinths, or the space that the wall leaves."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.builds.solid import require_settings, write_shape
+from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
+from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
+from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.field import FieldLike
+from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
+from gyroid_cad.filling.part import Filling, Outcome
+from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.lattice import USUAL_TOLERANCE, Lattice
+from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
+from gyroid_cad.render.picture import CAMERA, SIZE, require_view
+from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
+from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.wall.covering import Frame
+from gyroid_cad.wall.limits import require_cell_size, sound_tolerance
+
+if TYPE_CHECKING:
+    from gyroid_cad.kernel.part import Part
+    from gyroid_cad.kernel.skin import Hollow
+    from gyroid_cad.kernel.solid import KernelShape
+
+__all__ = ["FillReport", "Filled", "fill", "part_of"]
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class FillReport:
+    """What a filled part turned out to be.
+
+    Attributes
+    ----------
+    kind : str
+    cell_size, thickness : float
+        In mm; the wall where it is thickest, or for a labyrinth twice the distance of its border from the surface.
+    smallest_wall : float, optional
+        The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a labyrinth.
+    skin : float, optional
+        In mm.
+    solids, faces : int
+    valid, closed : bool
+        By the kernel's own check; every edge bounds exactly two faces. The bare surface is not closed.
+    part_volume, volume : float
+        In mm3.
+    density : float
+        Volume by that of the part.
+    area : float
+        Of the surface, in mm2.
+    mass, part_mass : float, optional
+        In g, for a material's density.
+    islands : int
+        Pieces besides the largest one of each domain.
+    dropped : int
+        Islands left out.
+    cut_patches, whole_patches : int
+        That the part's boundary may cross, and that lie wholly inside.
+    by_sections : bool
+        Whether the part is a box, and so was cut without the kernel's booleans.
+    shift : tuple of float
+        Of the lattice, in mm, where the kernel did not manage without.
+    seconds : dict
+        By stage.
+    """
+
+    kind: str
+    cell_size: float
+    thickness: float
+    smallest_wall: float | None
+    skin: float | None
+    solids: int
+    faces: int
+    valid: bool
+    closed: bool
+    part_volume: float
+    volume: float
+    density: float
+    area: float
+    mass: float | None
+    part_mass: float | None
+    islands: int
+    dropped: int
+    cut_patches: int
+    whole_patches: int
+    by_sections: bool
+    shift: Point
+    seconds: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain values, ready for JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filled:
+    """A filled part.
+
+    Attributes
+    ----------
+    domains : dict
+        Shape by name: "sheet", "network-a", "network-b", "surface", or "channel-a" and "channel-b".
+    report : FillReport
+    """
+
+    domains: dict[str, KernelShape]
+    report: FillReport
+
+    def solid(self) -> KernelShape:
+        """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own."""
+        from gyroid_cad.kernel.solid import another_handle
+        from gyroid_cad.kernel.split import compound_of
+
+        shapes = list(self.domains.values())
+        return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
+
+    def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
+        """The filled part drawn, as a PNG file, as :meth:`gyroid_cad.Lattice.picture` draws a lattice.
+
+        Raises
+        ------
+        ParameterError, ExportError
+        """
+        return shape_picture(self.solid(), *require_view(size, camera))
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
+        report = self.report
+        rows = [
+            ("kind", f"{report.kind}, cells of {report.cell_size:g} mm"),
+            ("solids, faces", f"{report.solids}, {report.faces}"),
+            ("volume", f"{report.volume:.5g} mm3 of {report.part_volume:.5g}, density {report.density:.4g}"),
+            ("surface", f"{report.area:.5g} mm2"),
+            *([] if report.mass is None else [("mass", f"{report.mass:.4g} g of {report.part_mass:.4g} g")]),
+        ]
+        return mime_bundle("filled part", lambda: rows, self.picture)
+
+    def write(
+        self,
+        *paths: str | os.PathLike[str],
+        schema: str = "ap214",
+        deviation: float | None = None,
+        angle: float = 15.0,
+        progress: Progress | None = None,
+    ) -> None:
+        """Write the filled part, as :meth:`gyroid_cad.Lattice.write` does a lattice.
+
+        Raises
+        ------
+        ParameterError, ExportError
+        """
+        targets = require_formats(paths)
+        usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
+        limit = usual if deviation is None else finite_number("deviation", deviation)
+        require_settings((1, 1, 1), schema, limit, angle)
+        for path in targets:
+            if not self.report.closed and FORMATS[path.suffix.lower()] in TRIANGLE_FORMATS:
+                raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
+        for path in targets:
+            with timed(self.report.seconds, f"write {path.name}", progress):
+                write_shape(self.solid(), path, schema, limit, angle, cut=True)
+
+
+def fill(
+    part: Any,
+    cell_size: float | None = None,
+    thickness: FieldLike | None = None,
+    density: FieldLike | None = None,
+    kind: str = SHEET,
+    origin: Point = (0.0, 0.0, 0.0),
+    rotation: Point = (0.0, 0.0, 0.0),
+    fit: FitSettings | None = None,
+    drop_islands: bool = False,
+    material_density: float | None = None,
+    progress: Progress | None = None,
+    *,
+    skin: float | None = None,
+    openings: Sequence[Any] = (),
+    tolerance: float | None = None,
+    lattice: Lattice | None = None,
+    surface: str = USUAL.name,
+) -> Filled:
+    """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
+
+    Parameters
+    ----------
+    part : shape, Workplane or path-like
+        A TopoDS_Shape, a shape of CadQuery or build123d, or a STEP file; its solids must be closed and valid.
+    cell_size : float
+        Period of the cubic cell, in mm.
+    thickness : number or field, optional
+        Whole wall in mm; of the wall that is left, or that the channels leave. As of :class:`gyroid_cad.Lattice`,
+        with x, y and z places in the part's space.
+    density : number or field, optional
+        Volume fraction instead: of the wall, or of the labyrinth, for which it is one number.
+    kind : {"sheet", "network-a", "network-b", "channels", "surface"}
+        The wall; one of the two labyrinths it parts; both of them, the wall left out; or the mid-surface alone.
+    origin, rotation : tuple of float
+        Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
+    fit : FitSettings, optional
+    drop_islands : bool
+        Whether to leave out pieces cut off from the largest one.
+    material_density : float, optional
+        In g/cm3, for the masses in the report.
+    progress : callable, optional
+        Called with (stage, done, total).
+    skin : float, optional
+        Thickness in mm of a solid shell kept from the part and fused with the infill; channels end at it.
+    openings : sequence
+        Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
+        the faces furthest that way, or points (x, y, z), each for the face next to it.
+    tolerance : float, optional
+        Largest deviation in cell sizes of a wall that varies; 1e-4 if left out.
+    lattice : Lattice, optional
+        A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
+        size, thickness, density and surface are its own.
+    surface : {"gyroid", "diamond", "primitive"}
+
+    Returns
+    -------
+    Filled
+
+    Raises
+    ------
+    ParameterError
+    KernelError
+        If the kernel fails, or gives something that is not closed, not valid, or of the wrong volume; or cannot
+        offset the part by its skin.
+    """
+    frame = Frame(three_numbers("origin", origin), _turn(three_numbers("rotation", rotation)))
+    grams = None if material_density is None else positive_number("material_density", material_density) / 1000
+    shell = None if skin is None else positive_number("skin", skin, "a length in mm, a finite number above 0")
+    if openings and shell is None:
+        raise ParameterError("openings", openings, "none without a skin")
+    if shell is not None and kind == SURFACE:
+        raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
+    closeness = USUAL_TOLERANCE if tolerance is None else sound_tolerance(tolerance)
+    chosen = surface_named(surface)
+    regions, size, infill_in = _described(
+        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
+    )
+    whole = part_of(part)
+    hollow = None if shell is None else _hollowed(whole, shell, openings)
+    core = whole if hollow is None else hollow.core
+    filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
+    outcome = filling.run(frame)
+    return _reported(filling, outcome, kind, shell, drop_islands, grams)
+
+
+_InfillIn = Callable[["Part", Frame, Callable[[str], AbstractContextManager[None]]], Infill]
+
+
+def _described(
+    kind: str,
+    cell_size: float | None,
+    thickness: FieldLike | None,
+    density: FieldLike | None,
+    fit: FitSettings,
+    tolerance: float,
+    lattice: Lattice | None,
+    surface: MinimalSurface,
+) -> tuple[tuple[Region, ...], float, _InfillIn]:
+    """The regions wanted, the cell size, and how the lattice is to be had for a part and a frame."""
+    if lattice is not None:
+        given = {"cell_size": cell_size, "thickness": thickness, "density": density}
+        for name, value in given.items():
+            if value is not None:
+                raise ParameterError(name, value, "none beside a lattice, which has its own")
+        if kind != SHEET:
+            raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
+        regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
+        return regions.regions, lattice.cell_size, lambda part, frame, timed: block_infill(lattice, frame)
+    size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
+    require_cell_size(size)
+    wanted = regions_of(kind, size, thickness, density, surface.tube)
+
+    def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
+        made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
+        smallest = float(np.min(part.high - part.low))
+        if smallest <= made.thickest:
+            raise ParameterError("thickness", made.thickest, f"less than the part's smallest extent, {smallest:.6g} mm")
+        return made
+
+    return wanted.regions, size, endless
+
+
+def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
+    from gyroid_cad.kernel.selection import selected_faces
+    from gyroid_cad.kernel.skin import hollow
+
+    return hollow(part, skin, selected_faces(part, openings))
+
+
+def _reported(
+    filling: Filling, outcome: Outcome, kind: str, skin: float | None, drop_islands: bool, grams: float | None
+) -> Filled:
+    from gyroid_cad.kernel.check import topology
+    from gyroid_cad.kernel.split import compound_of
+
+    domains = outcome.domains
+    islands, dropped = sum(len(some) - 1 for some in domains.values()), 0
+    if drop_islands and islands:
+        islands, dropped = 0, islands
+        domains = {name: some[:1] for name, some in domains.items()}
+    shapes = {
+        name: some[0].shape if len(some) == 1 else compound_of(made.shape for made in some)
+        for name, some in domains.items()
+    }
+    counted = topology(compound_of(shapes.values()))
+    volume = sum(made.volume for some in domains.values() for made in some)
+    walls = [outcome.infill.thinnest] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
+    x, y, z = outcome.shift.tolist()
+    report = FillReport(
+        kind=kind,
+        cell_size=filling.cell_size,
+        thickness=outcome.infill.thickest,
+        smallest_wall=min([*walls, *([] if skin is None else [skin])], default=None),
+        skin=skin,
+        solids=counted.solids,
+        faces=counted.faces,
+        valid=True,
+        closed=counted.closed,
+        part_volume=filling.part.volume,
+        volume=volume,
+        density=volume / filling.part.volume,
+        area=sum(made.area for some in domains.values() for made in some),
+        mass=None if grams is None else grams * volume,
+        part_mass=None if grams is None else grams * filling.part.volume,
+        islands=islands,
+        dropped=dropped,
+        cut_patches=outcome.cut,
+        whole_patches=outcome.whole,
+        by_sections=outcome.by_sections,
+        shift=(x, y, z),
+        seconds=dict(filling.seconds),
+    )
+    return Filled(shapes, report)
+
+
+def part_of(given: Any) -> Part:
+    """The closed, valid solids of whatever a user gives as a part.
+
+    Parameters
+    ----------
+    given : shape, Workplane or path-like
+        As of :func:`fill`.
+
+    Raises
+    ------
+    ParameterError
+    ExportError
+        If a file is no STEP file or holds no shape.
+    """
+    from gyroid_cad.kernel.part import require_part
+    from gyroid_cad.kernel.split import compound_of
+    from gyroid_cad.kernel.step import read_step
+
+    if isinstance(given, str | os.PathLike):
+        return require_part(read_step(given))
+    if hasattr(given, "vals"):
+        return require_part(compound_of(shape.wrapped for shape in given.vals()))
+    shape = getattr(given, "wrapped", given)
+    if not hasattr(shape, "ShapeType"):
+        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
+    return require_part(shape)
+
+
+def _turn(degrees: Floats) -> Floats:
+    """Turns about x, then y, then z."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("xyz", degrees, degrees=True).as_matrix())

@@ -1,0 +1,196 @@
+"""The lattice that a part is filled with: an endless one, or a block that was described before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.progress import Timed
+from gyroid_cad.errors import SoundnessError
+from gyroid_cad.fields.field import Field
+from gyroid_cad.filling.wanted import Region, Regions
+from gyroid_cad.lattice import Lattice
+from gyroid_cad.surface.families import MinimalSurface
+from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.covering import (
+    SIDE_SAMPLES,
+    Frame,
+    covering_complex,
+    nearest_offsets,
+    periodic_offsets,
+    sides_of_points,
+    wall_extremes,
+)
+from gyroid_cad.wall.exact import laid_patches, patch_points
+from gyroid_cad.wall.graded_fit import fit_wall
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["Infill", "block_infill", "endless_infill"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+_BLOCK_SAMPLES = 13
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Infill:
+    """A lattice in the space of a part.
+
+    Attributes
+    ----------
+    frame : Frame
+        Where it stands.
+    grading : Grading
+        In its own space.
+    complex : CellComplex
+    wall : Wall
+        In the part's space.
+    thinnest, thickest : float
+        Wall in mm.
+    endless : bool
+        Whether it goes on beyond its patches; else it ends at its free side walls.
+    """
+
+    frame: Frame
+    grading: Grading
+    complex: CellComplex
+    wall: Wall
+    thinnest: float
+    thickest: float
+    endless: bool
+
+    def sides(self, distance: Any, holds: Any) -> Integers:
+        """Which patches lie inside a part, outside it, or may be crossed, as :func:`covering.patch_sides` tells."""
+        samples = np.linspace(-1, 1, SIDE_SAMPLES)
+        if self.endless:
+            own = patch_points(self.complex, self.grading.cell_size, samples)
+        else:
+            laid = [some.points for _, some in laid_patches(self.complex, self.grading, samples)]
+            own = np.concatenate(laid).reshape(-1, SIDE_SAMPLES**2, 3)
+        points = self.frame.placed(own)
+        return sides_of_points(self.complex, points, self.thickest / 2, distance, holds)
+
+    def offsets(self, points: Floats) -> Floats:
+        """How far points of the part's space lie from an endless mid-surface, in mm."""
+        return periodic_offsets(self.frame, self.grading.cell_size, points, self.grading.surface)
+
+    def holds(self, region: Region, points: Floats) -> Booleans:
+        """Which points of the part's space, shape (n, 3), lie in a region, to about 1e-3 cell sizes."""
+        if not self.endless:
+            return self._block_holds(region, points)
+        if self.grading.uniform:
+            return region.holds(self.offsets(points), np.full(len(points), self.thickest / 2))
+        own = self.frame.own(points)
+        halves = self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2
+        return region.holds(self.offsets(points), halves)
+
+    def _block_holds(self, region: Region, points: Floats) -> Booleans:
+        laid = [laid for _, laid in laid_patches(self.complex, self.grading, np.linspace(-1, 1, _BLOCK_SAMPLES))]
+        places, normals, thickness = (
+            np.concatenate([getattr(some, name) for some in laid]) for name in ("points", "normals", "thickness")
+        )
+        own = self.frame.own(points)
+        offsets, nearest = nearest_offsets(places, normals, own)
+        # Beyond the block's free edges the nearest sample is far to the side.
+        grid = places.reshape(-1, _BLOCK_SAMPLES, _BLOCK_SAMPLES, 3)
+        gap = sum(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)) / 2
+        aside = np.linalg.norm(own - places[nearest] - offsets[:, np.newaxis] * normals[nearest], axis=1)
+        return np.asarray(region.holds(offsets, thickness[nearest] / 2) & (aside <= gap))
+
+    def faces(self, region: Region) -> list[list[Any]]:
+        """The faces of every patch that bound a region, oriented out of it; neighbours share their edges."""
+        from gyroid_cad.kernel.solid import realise_faces, realise_patches
+
+        if not self.endless:
+            return realise_patches(self.wall)
+        pairs = realise_faces(self.wall)
+        return [
+            [pair[side].Reversed() if backwards else pair[side] for side, backwards in region.sides] for pair in pairs
+        ]
+
+
+def endless_infill(
+    low: Floats,
+    high: Floats,
+    frame: Frame,
+    cell_size: float,
+    regions: Regions,
+    fit: FitSettings,
+    tolerance: float,
+    timed: Timed,
+    surface: MinimalSurface,
+) -> Infill:
+    """An endless lattice, as far as a box in the part's space needs it.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (3,)
+        Of the box, in mm.
+    frame : Frame
+    cell_size : float
+        In mm.
+    regions : Regions
+    fit : FitSettings
+    tolerance : float
+        Of a wall that varies, in cell sizes.
+    timed : callable
+        A context for each stage, by its name.
+    surface : MinimalSurface
+
+    Raises
+    ------
+    ParameterError, SoundnessError, FitError
+    """
+    thickness, density = (_in_frame(value, frame) for value in (regions.thickness, regions.density))
+    grading = Grading(cell_size, thickness, density, surface=surface)
+    try:
+        with timed("cover"):
+            thinnest, thickest = wall_extremes(low, high, frame, grading)
+            complex = covering_complex(low, high, frame, cell_size, thickest / 2, surface)
+        wall, refit = fit_wall(complex, grading, fit, tolerance, timed)
+    except SoundnessError as error:
+        raise _moved(error, frame) from None
+    if refit is not None:
+        thinnest, thickest = min(thinnest, refit.thinnest), max(thickest, refit.thickest)
+    return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), thinnest, thickest, True)
+
+
+def block_infill(lattice: Lattice, frame: Frame) -> Infill:
+    """A block of cells that was described as a lattice, with whatever varies in it.
+
+    Parameters
+    ----------
+    lattice : Lattice
+    frame : Frame
+        Where the lattice's own origin stands.
+    """
+    laid = lattice.laid()
+    wall = laid.wall.moved(frame.rotation, frame.origin)
+    return Infill(frame, laid.recipe.grading, laid.complex, wall, laid.thinnest, laid.thickest, False)
+
+
+def _in_frame(value: float | Field | None, frame: Frame) -> float | Field | None:
+    """A field of the part's space as one of the lattice's own."""
+    if not isinstance(value, Field):
+        return value
+    function = value.function
+
+    def carried(x: Floats, y: Floats, z: Floats) -> Any:
+        return function(*frame.placed(np.stack([x, y, z], axis=-1)).T)
+
+    return replace(value, function=carried)
+
+
+def _moved(error: SoundnessError, frame: Frame) -> SoundnessError:
+    """The same, with its place in the part's space."""
+    x, y, z = frame.placed(np.array(error.place)).tolist()
+    kind, given = error.__reduce__()
+    parameter, value, _, *rest = given
+    return kind(parameter, value, (x, y, z), *rest)  # type: ignore[arg-type]

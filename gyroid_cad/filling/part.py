@@ -1,0 +1,264 @@
+"""From a part and a lattice to the checked solids of what is left, shifting the lattice where the kernel fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.progress import Progress, tell, timed
+from gyroid_cad.errors import KernelError
+from gyroid_cad.filling.infill import Infill
+from gyroid_cad.filling.wanted import Region
+from gyroid_cad.trim.box import BoxedWall, cut_to_box
+from gyroid_cad.wall.covering import CROSSING, INSIDE, PHASES, Frame
+
+if TYPE_CHECKING:
+    from gyroid_cad.kernel.part import Part
+    from gyroid_cad.kernel.skin import Hollow
+    from gyroid_cad.kernel.solid import KernelShape
+
+__all__ = ["Filling", "Made", "Outcome"]
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float, float]
+
+# Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
+_BOUNDARY_SPACING = 1 / 12
+# An estimate of the volume from so many points; further off than so many of its deviations, something is wrong.
+_ESTIMATE_POINTS, _ESTIMATE_DEVIATIONS, _ESTIMATE_ERROR = 4096, 6.0, 0.02
+# Of the layer round a bare surface whose volume tells its area, in cell sizes.
+_SURFACE_LAYER = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Made:
+    """A solid, or a shell of the bare surface, with its volume in mm3 and its area in mm2."""
+
+    shape: KernelShape
+    volume: float
+    area: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What filling gave.
+
+    Attributes
+    ----------
+    domains : dict
+        Solids, or shells, by the name of their region; the largest first.
+    infill : Infill
+    shift : ndarray, shape (3,)
+        Of the lattice, in mm, where the kernel did not manage without.
+    cut, whole : int
+        Patches that the part's boundary may cross, and that lie wholly inside.
+    by_sections : bool
+        Whether the part is a box, and so was cut without the kernel's booleans.
+    """
+
+    domains: dict[str, list[Made]]
+    infill: Infill
+    shift: Floats
+    cut: int
+    whole: int
+    by_sections: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filling:
+    """What stays the same however the lattice is shifted.
+
+    Attributes
+    ----------
+    part : Part
+    hollow : Hollow, optional
+        The part with its skin taken off, of which the rest is filled.
+    regions : tuple of Region
+    infill_in : callable
+        The lattice in a frame.
+    cell_size : float
+        In mm.
+    progress : callable, optional
+    seconds : dict
+        By stage.
+    """
+
+    part: Part
+    hollow: Hollow | None
+    regions: tuple[Region, ...]
+    infill_in: Callable[[Frame, Callable[[str], AbstractContextManager[None]]], Infill]
+    cell_size: float
+    progress: Progress | None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def core(self) -> Part:
+        """What is filled: the part, or what its skin leaves of it."""
+        return self.part if self.hollow is None else self.hollow.core
+
+    def run(self, frame: Frame) -> Outcome:
+        """Fill, with the lattice a little shifted where the kernel does not manage otherwise.
+
+        Raises
+        ------
+        KernelError
+        """
+        points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
+        with self.timed("cover"):
+            points = points[self.core.holds(points)]
+        problem: KernelError | None = None
+        # Booleans the last time in one process: should it be the joining of regions that fails.
+        attempts: list[tuple[Point, bool, int | None]] = [
+            (phase, False, processes) for phase, processes in zip(PHASES, (None, None, 1), strict=True)
+        ]
+        if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
+            # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
+            attempts = [(phase, True, None) for phase in PHASES] + attempts
+        for phase, by_sections, processes in attempts:
+            shift = np.array(phase) * self.cell_size
+            try:
+                return self._filled(replace(frame, origin=frame.origin + shift), shift, points, by_sections, processes)
+            except KernelError as failed:
+                problem = problem or failed
+        raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
+
+    def timed(self, stage: str) -> AbstractContextManager[None]:
+        return timed(self.seconds, stage, self.progress)
+
+    def _filled(self, frame: Frame, shift: Floats, points: Floats, by_sections: bool, processes: int | None) -> Outcome:
+        infill = self.infill_in(frame, self.timed)
+        # A block's own side walls are none of the faces that sections are found of.
+        by_sections = by_sections and infill.endless
+        made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
+        with self.timed("check"):
+            for region in self.regions:
+                self._require_right_size(infill, region, made[region.name], points)
+            domains = {name: sorted(some, key=_size, reverse=True) for name, some in made.items() if some}
+            if not domains:
+                raise KernelError("nothing of the lattice lies in the part")
+            self._require_sound(piece.shape for some in domains.values() for piece in some)
+        return Outcome(domains, infill, shift, cut, whole, by_sections)
+
+    def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
+        """Of a box, whose sides are planes: cut without the kernel."""
+        from gyroid_cad.kernel.trimmed import realise_boxed
+
+        box = self.core.box
+        assert box is not None
+        corner = (box.axes @ box.low)[np.newaxis]
+        made, cut, whole = {}, 0, 0
+        for region in self.regions:
+            # A skin and what is joined to it are the part less the voids that the lattice leaves in the core.
+            skinned = self.hollow is not None and not region.fluid
+            sides = [(side, backwards != skinned) for side, backwards in region.sides]
+            with self.timed("cut"):
+                filled = not region.surface and bool(infill.holds(region, corner)[0]) != skinned
+                left = cut_to_box(infill.wall, box, sides, self.cell_size, filled, capped=not region.surface)
+            with self.timed("solid"):
+                shapes = realise_boxed(left)
+            pieces = [
+                Made(shape, 0.0 if region.surface else float(volume), float(area))
+                for shape, volume, area in zip(shapes, left.volumes, left.areas, strict=True)
+            ]
+            made[region.name] = [self._less(pieces)] if skinned else pieces
+            counted = _patches_of(left)
+            cut, whole = max(cut, counted[0]), max(whole, counted[1])
+        return made, cut, whole
+
+    def _less(self, voids: list[Made]) -> Made:
+        """The part less voids within it."""
+        from gyroid_cad.kernel.part import measure
+        from gyroid_cad.kernel.trimmed import hollowed_by
+
+        volume, area = measure(self.part.shape)
+        shape = hollowed_by(self.part.shape, (void.shape for void in voids))
+        return Made(shape, volume - sum(void.volume for void in voids), area + sum(void.area for void in voids))
+
+    def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
+        from gyroid_cad.kernel.part import measure
+        from gyroid_cad.kernel.regions import split_by_region
+        from gyroid_cad.kernel.split import bounded_solids, shells_of
+
+        with self.timed("cover"):
+            sides = infill.sides(self._distance_from_boundary(), self.core.holds)
+        made = {}
+        for region in self.regions:
+            with self.timed("faces"):
+                faces = infill.faces(region)
+            cut, whole = (
+                [face for patch in np.flatnonzero(sides == side).tolist() for face in faces[patch]]
+                for side in (CROSSING, INSIDE)
+            )
+            with self.timed("split"):
+                pieces = split_by_region(
+                    self.core, cut, processes, lambda done, count: tell(self.progress, "split", done, count)
+                )
+
+            def wanted_at(point: Floats, region: Region = region) -> bool:
+                return bool(infill.holds(region, point[np.newaxis])[0])
+
+            with self.timed("join"):
+                if region.surface:
+                    shapes: list[Any] = shells_of([*pieces.inside, *whole])
+                elif self.hollow is None or region.fluid:
+                    shapes = list(bounded_solids(pieces, whole, wanted_at))
+                else:
+                    shapes = list(self.hollow.solids(pieces, whole, wanted_at))
+            with self.timed("measure"):
+                made[region.name] = [
+                    Made(shape, 0.0, measure(shape)[1]) if region.surface else Made(shape, *measure(shape))
+                    for shape in shapes
+                ]
+        return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
+
+    def _distance_from_boundary(self) -> Callable[[Floats], Floats]:
+        from scipy.spatial import cKDTree
+
+        samples, error = self.core.surface_samples(_BOUNDARY_SPACING * self.cell_size)
+        tree = cKDTree(samples)
+        return lambda points: np.asarray(tree.query(points)[0]) - error
+
+    def _require_right_size(self, infill: Infill, region: Region, made: list[Made], points: Floats) -> None:
+        """Compare with an estimate that asks no boolean: how many of the points in the part lie in the region."""
+        layer = 1.0
+        if region.surface:
+            layer = 2 * _SURFACE_LAYER * self.cell_size
+            hits = int(np.sum(np.abs(infill.offsets(points)) < layer / 2))
+        else:
+            hits = int(np.sum(infill.holds(region, points)))
+        box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
+        skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
+        size = sum(_size(piece) for piece in made) - skin
+        expected, deviation = hits * box, np.sqrt(hits + 1) * box
+        if not abs(size - expected) <= _ESTIMATE_DEVIATIONS * deviation + _ESTIMATE_ERROR * expected:
+            unit = "mm2" if region.surface else "mm3"
+            raise KernelError(
+                f"the kernel's {region.name} has {size:.6g} {unit}, where about {expected:.4g} {unit} are expected"
+            )
+
+    def _require_sound(self, shapes: Iterable[KernelShape]) -> None:
+        from gyroid_cad.kernel.check import is_valid, topology
+        from gyroid_cad.kernel.split import compound_of
+
+        everything = compound_of(shapes)
+        counted, valid = topology(everything), is_valid(everything)
+        closed = counted.closed or all(region.surface for region in self.regions)
+        if not (valid and closed):
+            state = "valid" if valid else "invalid"
+            raise KernelError(f"the kernel's filled part is {state}, with {counted.open_edges} open edges")
+
+
+def _size(made: Made) -> float:
+    """Volume, or of a bare surface its area."""
+    return made.volume or made.area
+
+
+def _patches_of(left: BoxedWall) -> tuple[int, int]:
+    """How many patches a box cuts, and how many it leaves whole."""
+    cut = {face.patch for face in left.faces if any(rim < 0 for rims in face.rims for rim in rims)}
+    return len(cut), len({face.patch for face in left.faces} - cut)

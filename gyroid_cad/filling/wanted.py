@@ -1,0 +1,142 @@
+"""What a part may be filled with: regions of space between offsets of the mid-surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.checks import finite_number
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.field import Field, FieldLike, as_field
+from gyroid_cad.surface.tube import TubeLaw
+from gyroid_cad.wall.limits import require_density, require_one, require_thickness
+
+__all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
+
+Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+
+SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS = ("sheet", "network-a", "network-b", "channels", "surface")
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Space between two offsets of the mid-surface.
+
+    Attributes
+    ----------
+    name : str
+    lowest, highest : float, optional
+        In half walls along the common normal; None where there is no end.
+    surface : bool
+        Whether it is not space at all, but the mid-surface alone.
+    fluid : bool
+        Whether it is what the wall leaves: then a skin bounds it, and is no part of it.
+    """
+
+    name: str
+    lowest: float | None
+    highest: float | None
+    surface: bool = False
+    fluid: bool = False
+
+    def holds(self, offsets: Floats, halves: Floats) -> Booleans:
+        """Which offsets, in mm, lie between, where the half wall is so many mm."""
+        low = -np.inf if self.lowest is None else self.lowest * halves
+        high = np.inf if self.highest is None else self.highest * halves
+        return np.asarray((offsets > low) & (offsets < high))
+
+    @property
+    def sides(self) -> list[tuple[int, bool]]:
+        """Which of the wall's faces, 0 or 1, bound it, and whether against the common normal."""
+        if self.surface:
+            return [(1, False)]
+        below = [] if self.lowest is None else [(int(self.lowest >= 0), True)]
+        return below + ([] if self.highest is None else [(int(self.highest > 0), False)])
+
+
+@dataclass(frozen=True, slots=True)
+class Regions:
+    """The regions of a kind, and the wall between or round them.
+
+    Attributes
+    ----------
+    regions : tuple of Region
+    thickness, density : float or Field, optional
+        Of the wall, one of the two: whole wall in mm, 0 where the two faces of it are one; or its volume fraction.
+    """
+
+    regions: tuple[Region, ...]
+    thickness: float | Field | None = None
+    density: float | Field | None = None
+
+
+def regions_of(
+    kind: str, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw
+) -> Regions:
+    """The regions that a kind is made of.
+
+    Parameters
+    ----------
+    kind : str
+        One of :data:`KINDS`.
+    cell_size : float
+        In mm.
+    thickness, density : number or field, optional
+        Exactly one, but none for the bare surface.
+    tube : TubeLaw
+        Of the surface.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if kind not in KINDS:
+        raise ParameterError("kind", kind, " or ".join(KINDS))
+    if kind == SURFACE:
+        for name, value in (("thickness", thickness), ("density", density)):
+            if value is not None:
+                raise ParameterError(name, value, "none: the bare surface has no wall")
+        return Regions((Region(SURFACE, None, None, surface=True),), thickness=0.0)
+    require_one(thickness, density)
+    if kind in (NETWORK_A, NETWORK_B):
+        return _network(kind, cell_size, density, tube)
+    regions = (
+        (Region("channel-a", 1.0, None, fluid=True), Region("channel-b", None, -1.0, fluid=True))
+        if kind == CHANNELS
+        else (Region(SHEET, -1.0, 1.0),)
+    )
+    return _wall(regions, cell_size, thickness, density, tube)
+
+
+def _wall(
+    regions: tuple[Region, ...],
+    cell_size: float,
+    thickness: FieldLike | None,
+    density: FieldLike | None,
+    tube: TubeLaw,
+) -> Regions:
+    if thickness is not None:
+        wall = as_field("thickness", thickness, "a length in mm")
+        if isinstance(wall, float):
+            require_thickness(wall, cell_size, tube)
+        return Regions(regions, thickness=wall)
+    fraction = as_field("density", density, "a volume fraction")
+    if isinstance(fraction, float):
+        require_density(fraction, cell_size, tube)
+        return Regions(regions, thickness=float(tube.thickness(fraction) * cell_size))
+    return Regions(regions, density=fraction)
+
+
+def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
+    low, high = (1 - tube.largest_density) / 2, (1 + tube.largest_density) / 2
+    accepted = f"the labyrinth's volume fraction, one number above {low:.5f} and below {high:.5f}"
+    fraction = finite_number("density", density, accepted)
+    if not low < fraction < high:
+        raise ParameterError("density", density, accepted)
+    offset = float(tube.network_offset(fraction) * cell_size)
+    end = float(np.sign(offset)) if offset else 0.0
+    region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)
+    return Regions((region,), thickness=2 * abs(offset))

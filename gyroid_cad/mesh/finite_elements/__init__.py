@@ -1,0 +1,1 @@
+"""Structured hexahedra and quadrilaterals, their quality and files."""

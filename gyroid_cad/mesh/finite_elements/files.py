@@ -1,0 +1,199 @@
+"""Meshes as files: VTU, Gmsh and NASTRAN through meshio, ANSYS through mapdl-archive, Abaqus by our own hand."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.progress import Progress
+from gyroid_cad.errors import ExportError, ParameterError
+from gyroid_cad.mesh.finite_elements.abaqus import abaqus_name, write_abaqus
+from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
+
+__all__ = ["MESH_FORMATS", "require_mesh_format", "write_mesh"]
+
+Integers = NDArray[np.int64]
+
+MESH_FORMATS = {
+    ".vtu": "vtu",
+    ".msh": "gmsh",
+    ".inp": "abaqus",
+    ".cdb": "ansys",
+    ".bdf": "nastran",
+    ".nas": "nastran",
+}
+# Without nodes in the middle of faces.
+_NO_FULL = ("abaqus", "ansys", "nastran")
+_NASTRAN_DIGITS = 10
+# The whole wall's physical group in Gmsh files; surfaces follow. Bounding cells are told by the element's entity.
+_WALL_GROUP = 1
+
+
+def require_mesh_format(path: str | os.PathLike[str], full: bool = False) -> Path:
+    """Check the ending and the folder of a file to be written, before anything is meshed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in MESH_FORMATS:
+        raise ParameterError("output", str(path), f"a file name ending in {', '.join(MESH_FORMATS)}")
+    if full and MESH_FORMATS[ending] in _NO_FULL:
+        raise ParameterError("full", full, f"none in {ending} files; .vtu and .msh have elements of 27 nodes")
+    if MESH_FORMATS[ending] == "ansys":
+        _mapdl_archive()
+    return require_writable(path)
+
+
+def write_mesh(
+    mesh: Mesh,
+    path: str | os.PathLike[str],
+    pairs: PeriodicPairs | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Write a mesh with its sets; the path's ending chooses the format. The file appears whole or not at all.
+
+    Sets are physical groups and arrays in Gmsh and VTU files, components in ANSYS files, sets and surfaces in
+    Abaqus files, and property numbers (of bounding cells) in NASTRAN files, which know no more.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    path : path-like
+        Ending in .vtu, .msh, .inp, .cdb, .bdf or .nas.
+    pairs : PeriodicPairs, optional
+        In VTU and Abaqus files.
+    progress : callable, optional
+        Called with (stage, done, total), while Abaqus files are written.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    target = require_mesh_format(path, len(mesh.element.nodes) in (9, 27))
+    kind = MESH_FORMATS[target.suffix.lower()]
+    with replacing(target) as temporary:
+        if kind == "abaqus":
+            abaqus_name(mesh)
+            with temporary.open("w", encoding="ascii") as file:
+                write_abaqus(mesh, file, pairs, progress)
+            return
+        writers: dict[str, Callable[[], None]] = {
+            "vtu": lambda: _write_by_meshio(_vtu(mesh, pairs), temporary, "vtu"),
+            "gmsh": lambda: _write_by_meshio(_gmsh(mesh), temporary, "gmsh22", binary=True),
+            "nastran": lambda: _write_nastran(mesh, temporary),
+            "ansys": lambda: _write_ansys(mesh, temporary),
+        }
+        writers[kind]()
+
+
+def _write_by_meshio(mesh: Any, path: Path, file_format: str, **options: Any) -> None:
+    import meshio
+
+    try:
+        meshio.write(path, mesh, file_format=file_format, **options)
+    except meshio.WriteError as problem:
+        raise ExportError(f"the mesh was not written: {problem}") from problem
+
+
+def _ids(mesh: Mesh) -> dict[str, Integers]:
+    """Of every element: its patch, bounding cell, cubic cell and layer, from 1; shape (elements,) each."""
+    complex, patch = mesh.complex, mesh.element_patch
+    cell_of_patch = np.unique(complex.patch_cell, axis=0, return_inverse=True)[1].ravel()
+    return {
+        "patch": patch + 1,
+        "bounding_cell": complex.placements.bounding_cell[complex.patch_placement][patch] + 1,
+        "cubic_cell": cell_of_patch[patch] + 1,
+        "layer": mesh.element_layer + 1,
+    }
+
+
+def _vtu(mesh: Mesh, pairs: PeriodicPairs | None) -> Any:
+    import meshio
+
+    at_nodes: dict[str, Any] = {
+        name.lower(): _members(nodes, len(mesh.points)).astype(np.int8) for name, nodes in mesh.node_sets().items()
+    }
+    if pairs is not None:
+        # The node that each is a copy of, itself where it is none.
+        at_nodes["periodic_first"] = np.arange(len(mesh.points))
+        at_nodes["periodic_first"][pairs.second] = pairs.first
+    cells = [(mesh.element.name, mesh.cells)]
+    return meshio.Mesh(mesh.points, cells, at_nodes, {name: [ids] for name, ids in _ids(mesh).items()})
+
+
+def _gmsh(mesh: Mesh) -> Any:
+    import meshio
+
+    ids = _ids(mesh)
+    dimension = 3 if mesh.layers else 2
+    blocks = [(mesh.element.name, mesh.cells)]
+    groups, entities = [np.full(len(mesh.cells), _WALL_GROUP)], [ids["bounding_cell"]]
+    names = {"WALL": np.array([_WALL_GROUP, dimension])}
+    for group, (name, surface) in enumerate(mesh.surfaces().items(), _WALL_GROUP + 1):
+        blocks.append((mesh.element.face_name, mesh.surface_nodes(surface)))
+        groups.append(np.full(len(surface.elements), group))
+        entities.append(np.full(len(surface.elements), group))
+        names[name] = np.array([group, 2])
+    data = {"gmsh:physical": groups, "gmsh:geometrical": entities}
+    return meshio.Mesh(mesh.points, blocks, cell_data=data, field_data=names)
+
+
+def _write_nastran(mesh: Mesh, path: Path) -> None:
+    """A whole deck, without materials and loads; bounding cells are properties."""
+    import meshio
+
+    # meshio has 16 characters for a number, and stops at one that would take more.
+    decimals = _NASTRAN_DIGITS - 1 - int(np.floor(np.log10(np.abs(mesh.points).max())))
+    properties = {"nastran:ref": [_ids(mesh)["bounding_cell"]]}
+    rounded = meshio.Mesh(np.round(mesh.points, decimals), [(mesh.element.name, mesh.cells)], cell_data=properties)
+    text = StringIO()
+    meshio.nastran.write(text, rounded)
+    # It calls quadratic hexahedra by a name of its own.
+    deck = text.getvalue().replace("CHEXA_  ", "CHEXA   ")
+    path.write_text("SOL 101\nCEND\n" + deck, encoding="ascii")
+
+
+def _mapdl_archive() -> Any:
+    try:
+        import mapdl_archive
+        import pyvista
+    except ImportError:
+        raise ParameterError(
+            "output", ".cdb", "another ending, or mapdl-archive installed: pip install 'gyroid_cad[ansys]'"
+        ) from None
+    return mapdl_archive, pyvista
+
+
+def _write_ansys(mesh: Mesh, path: Path) -> None:
+    mapdl_archive, pyvista = _mapdl_archive()
+    vtk_type = {
+        "hexahedron": pyvista.CellType.HEXAHEDRON,
+        "hexahedron20": pyvista.CellType.QUADRATIC_HEXAHEDRON,
+        "quad": pyvista.CellType.QUAD,
+    }.get(mesh.element.name)
+    if vtk_type is None:
+        raise ParameterError("order", mesh.element.order, "1 for the mid-surface in .cdb files")
+    grid = pyvista.UnstructuredGrid({vtk_type: mesh.cells}, mesh.points)
+    for name, nodes in mesh.node_sets().items():
+        grid.point_data[name] = _members(nodes, len(mesh.points))
+    for name, elements in mesh.element_sets().items():
+        grid.cell_data[name] = _members(elements, len(mesh.cells))
+    for name in ("ansys_material_type", "ansys_real_constant"):
+        grid.cell_data[name] = np.ones(len(mesh.cells), dtype=np.int32)
+    mapdl_archive.save_as_archive(str(path), grid)
+
+
+def _members(numbers: Integers, count: int) -> NDArray[np.bool_]:
+    members = np.zeros(count, dtype=bool)
+    members[numbers] = True
+    return members

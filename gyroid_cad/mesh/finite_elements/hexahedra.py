@@ -1,0 +1,288 @@
+"""The wall as structured hexahedra, and its mid-surface as quadrilaterals: the paper's mesh, with no meshing step.
+
+Every patch is a grid, every wall so many layers of it. Nodes are places of that grid, shared by number through the
+complex; nothing is merged by distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, ElementType, element_type
+from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_places, place_count
+from gyroid_cad.nurbs.surface import grid_points
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["Mesh", "Surface", "hexahedra", "quadrilaterals"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Of the mesh and of a file that is made of it, for each node of each element; and of what imports take.
+_BYTES_PER_ELEMENT_NODE, _BYTES_BEFORE = 60, 300_000_000
+# So few that what is computed for them stays in the processor's cache.
+_PATCHES_AT_ONCE = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Faces of elements.
+
+    Attributes
+    ----------
+    elements, faces : ndarray of int, shape (faces,)
+        Which element, and which of its faces, from 0.
+    """
+
+    elements: Integers
+    faces: Integers
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Elements that share nodes by number.
+
+    Elements come patch by patch, layer by layer from face B to face A, then along u and v.
+
+    Attributes
+    ----------
+    complex : CellComplex
+    element : ElementType
+    subdivisions, layers : int
+        Elements along each side of a patch, and across the wall; no layer of a mid-surface.
+    points : ndarray, shape (nodes, 3)
+        In mm.
+    cells : ndarray of int, shape (elements, nodes of an element)
+        In VTK's order.
+    levels : int
+        Of nodes across the wall.
+    kept : ndarray of int, shape (nodes,), optional
+        Which of all places and levels have a node, if not each does.
+    """
+
+    complex: CellComplex
+    element: ElementType
+    subdivisions: int
+    layers: int
+    points: Floats
+    cells: Integers
+    levels: int
+    kept: Integers | None = None
+
+    def __post_init__(self) -> None:
+        # Made for this mesh alone and by far the largest things about: frozen where they are, not copied.
+        for array in (self.points, self.cells, self.kept):
+            if array is not None:
+                array.setflags(write=False)
+
+    @property
+    def element_patch(self) -> Integers:
+        """Which patch each element belongs to; shape (elements,)."""
+        return np.arange(len(self.cells)) // (max(self.layers, 1) * self.subdivisions**2)
+
+    @property
+    def element_layer(self) -> Integers:
+        """Which layer each element belongs to, from face B on; shape (elements,)."""
+        return np.arange(len(self.cells)) // self.subdivisions**2 % max(self.layers, 1)
+
+    @property
+    def columns(self) -> tuple[Integers, Integers]:
+        """At which place of the patches' grid, and at which level across the wall, each node stands; shape (nodes,)."""
+        numbers = np.arange(len(self.points)) if self.kept is None else self.kept
+        return np.divmod(numbers, self.levels)
+
+    def surfaces(self) -> dict[str, Surface]:
+        """Faces A and B of the wall and its free side walls, as faces of elements; empty of a mid-surface."""
+        if not self.layers:
+            return {}
+        n = self.subdivisions
+        numbers = np.arange(len(self.cells)).reshape(-1, self.layers, n, n)
+        # Edge k of a patch is the row of its elements along side k of the square.
+        rows = (numbers[..., 0], numbers[:, :, -1], numbers[..., -1], numbers[:, :, 0])
+        free = self.complex.free[self.complex.patch_edges]
+        walls = [(row[free[:, k]].ravel(), face) for k, (row, face) in enumerate(zip(rows, EDGE_FACES, strict=True))]
+        return {
+            FACE_A: _surface([(numbers[:, -1].ravel(), TOP)]),
+            FACE_B: _surface([(numbers[:, 0].ravel(), BOTTOM)]),
+            FREE_WALLS: _surface(walls),
+        }
+
+    def surface_nodes(self, surface: Surface) -> Integers:
+        """Nodes of every face of a surface, outwards; shape (faces, nodes of a face)."""
+        return np.asarray(self.cells[surface.elements[:, np.newaxis], self.element.faces[surface.faces]])
+
+    def node_sets(self) -> dict[str, Integers]:
+        """Nodes on the surfaces, by their names, ascending."""
+        return {name: np.unique(self.surface_nodes(surface)) for name, surface in self.surfaces().items()}
+
+    def element_sets(self) -> dict[str, Integers]:
+        """Elements by bounding cell, cubic cell and layer: the colours of the paper's Fig. 11."""
+        patch, layer = self.element_patch, self.element_layer
+        bounding_cell = self.complex.placements.bounding_cell[self.complex.patch_placement]
+        cell, cell_of_patch = np.unique(self.complex.patch_cell, axis=0, return_inverse=True)
+        sets = {f"BC_{k + 1}": np.flatnonzero(bounding_cell[patch] == k) for k in np.unique(bounding_cell).tolist()}
+        for k, (x, y, z) in enumerate(cell.tolist()):
+            sets[f"CC_{x + 1}_{y + 1}_{z + 1}"] = np.flatnonzero(cell_of_patch.ravel()[patch] == k)
+        if self.layers > 1:
+            sets |= {f"LAYER_{k + 1}": np.flatnonzero(layer == k) for k in range(self.layers)}
+        return sets
+
+
+def hexahedra(wall: Wall, subdivisions: int, layers: int = 1, order: int = 1, full: bool = False) -> Mesh:
+    """The wall as hexahedra.
+
+    Parameters
+    ----------
+    wall : Wall
+    subdivisions : int
+        Elements along each side of a patch.
+    layers : int
+        Across the wall.
+    order : {1, 2}
+        Elements of 8 nodes, or of 20.
+    full : bool
+        Quadratic elements of 27 nodes.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    ParameterError
+        Also if memory would not do, saying how much it would take.
+    """
+    element = element_type(True, order, full)
+    return _meshed(wall, _count("subdivisions", subdivisions), _count("layers", layers), element)
+
+
+def quadrilaterals(wall: Wall, subdivisions: int, order: int = 1, full: bool = False) -> Mesh:
+    """The mid-surface as quadrilaterals.
+
+    Parameters
+    ----------
+    wall : Wall
+    subdivisions : int
+        Elements along each side of a patch.
+    order : {1, 2}
+        Elements of 4 nodes, or of 8.
+    full : bool
+        Quadratic elements of 9 nodes.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    ParameterError
+    """
+    return _meshed(wall, _count("subdivisions", subdivisions), 0, element_type(False, order, full))
+
+
+def _count(parameter: str, value: int) -> int:
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+        raise ParameterError(parameter, value, "a whole number from 1 on")
+    return int(value)
+
+
+def _meshed(wall: Wall, subdivisions: int, layers: int, element: ElementType) -> Mesh:
+    _require_room(wall.complex.patch_count, subdivisions, layers, element)
+    steps = element.order * subdivisions
+    across = np.linspace(0, 1, element.order * layers + 1) if layers else np.array([0.5])
+    points = _nodes(wall, steps, across)
+    cells = _cells(patch_places(wall.complex, steps), len(across), element)
+    kept = None
+    if element.sparse:
+        kept, numbers = np.unique(cells, return_inverse=True)
+        points, cells = points[kept], numbers.reshape(cells.shape)
+    return Mesh(wall.complex, element, subdivisions, layers, points, cells, len(across), kept)
+
+
+def _require_room(patches: int, subdivisions: int, layers: int, element: ElementType) -> None:
+    """Refuse a mesh that does not fit in memory."""
+    import psutil
+
+    elements = patches * subdivisions**2 * max(layers, 1)
+    needed = _BYTES_BEFORE + elements * _BYTES_PER_ELEMENT_NODE * len(element.nodes)
+    available = psutil.virtual_memory().available
+    if needed > available:
+        most = max(1, int(subdivisions * max(0.0, (available - _BYTES_BEFORE) / (needed - _BYTES_BEFORE)) ** 0.5))
+        raise ParameterError(
+            "subdivisions",
+            subdivisions,
+            f"at most about {most} with {max(layers, 1)} layers: these are {elements:,} elements, which take about "
+            f"{needed / 1e9:.3g} GB of memory, and {available / 1e9:.3g} GB are free",
+        )
+
+
+def _nodes(wall: Wall, steps: int, levels: Floats) -> Floats:
+    """Points at every place of the grid and every level across the wall, level by level; shape (nodes, 3)."""
+    patches = wall.complex.patch_count
+    points = np.empty((place_count(wall.complex, steps), len(levels), 3))
+    inside = points[len(points) - patches * (steps - 1) ** 2 :].reshape(patches, -1, len(levels), 3)
+    border = _on_border(steps)
+    alike = len(wall.nets) <= _PATCHES_AT_ONCE
+    known = _split_grids(wall, slice(None), steps, levels) if alike else None
+    for first in range(0, patches, _PATCHES_AT_ONCE):
+        some = slice(first, first + _PATCHES_AT_ONCE)
+        nets = wall.patch_net[some]
+        within, around = _split_grids(wall, nets, steps, levels) if known is None else (part[nets] for part in known)
+        shifts = wall.shifts[wall.patch_shift[some]][:, np.newaxis, np.newaxis]
+        # Axis by axis: loops of three would be too short.
+        for axis in range(3):
+            np.add(within[..., axis], shifts[..., axis], out=inside[some][..., axis])
+        points[patch_places(wall.complex, steps, some).reshape(len(nets), -1)[:, border]] = around + shifts
+    return points.reshape(-1, 3)
+
+
+def _split_grids(wall: Wall, nets: Integers | slice, steps: int, levels: Floats) -> tuple[Floats, Floats]:
+    """Points inside nets and on their borders, before their translations; shapes (nets, places, levels, 3)."""
+    grids = _grids(wall, nets, steps, levels)
+    grids = grids.reshape(len(grids), -1, len(levels), 3)
+    border = _on_border(steps)
+    return grids[:, ~border], grids[:, border]
+
+
+def _on_border(steps: int) -> NDArray[np.bool_]:
+    """Which places of a patch's grid, in one row, lie on its border."""
+    border = np.ones((steps + 1, steps + 1), dtype=bool)
+    border[1:-1, 1:-1] = False
+    return border.ravel()
+
+
+def _grids(wall: Wall, nets: Integers | slice, steps: int, levels: Floats) -> Floats:
+    along = np.linspace(-1, 1, steps + 1)
+    faces = grid_points(wall.nets[nets], wall.weights, (wall.knots, wall.knots), along, along)
+    below, above = faces[:, 0, :, :, np.newaxis], faces[:, 1, :, :, np.newaxis]
+    return np.asarray(below + levels[:, np.newaxis] * (above - below))
+
+
+def _cells(places: Integers, levels: int, element: ElementType) -> Integers:
+    """Elements on grids of places (patches, steps + 1, steps + 1), each of which has a node at every level."""
+    order, side = element.order, places.shape[1]
+    u, v, w = (element.nodes * order // 2).T
+    across, along = np.arange(0, max(levels - 1, 1), order), np.arange(0, side - 1, order)
+    # Of a patch's own nodes, in rows along v, u and the layers: the same for every patch.
+    of_patch = (
+        ((along[:, np.newaxis, np.newaxis] + u) * side + along[:, np.newaxis] + v) * levels
+        + across[:, np.newaxis, np.newaxis, np.newaxis]
+        + w
+    )
+    nodes = (places[..., np.newaxis] * levels + np.arange(levels)).reshape(len(places), -1)
+    return np.asarray(nodes.take(of_patch.ravel(), axis=1).reshape(-1, len(w)))
+
+
+def _surface(parts: list[tuple[Integers, int]]) -> Surface:
+    elements = np.concatenate([elements for elements, _ in parts])
+    return Surface(elements, np.concatenate([np.full(len(elements), face) for elements, face in parts]))

@@ -1,0 +1,1 @@
+"""Trivariate NURBS patches for isogeometric analysis, and their files."""

@@ -1,0 +1,1 @@
+"""Triangles of walls and files of triangles."""

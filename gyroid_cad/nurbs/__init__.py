@@ -1,0 +1,1 @@
+"""B-splines: curves, surfaces and volumes, their evaluation, quadrature and root finding."""

@@ -1,0 +1,95 @@
+"""Integrals over part of a face, whose border in the parameter square is known, by Green's theorem.
+
+What is integrated is sampled once on the whole square, at Gauss points between the knots, and stands for the polynomial
+through the samples of each span. The integral over what a border runs round is that of an antiderivative along u, taken
+along the border in v.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.nurbs.surface import gauss_points, grid_derivatives
+
+__all__ = ["SquareQuadrature"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# The flux through a cubic face without weights has degree 8 along each side.
+_PER_SPAN = 9
+# Few at once, so that memory stays small.
+_FACES_AT_ONCE = 64
+
+
+class SquareQuadrature:
+    """Flux, area vector and area of faces of one basis, over all or part of the parameter square.
+
+    Parameters
+    ----------
+    knots : ndarray
+        Along u and v.
+    """
+
+    def __init__(self, knots: Floats) -> None:
+        self.knots = knots
+        self.breaks = np.unique(knots)
+        self.places, self.weights = gauss_points(knots, _PER_SPAN)
+        nodes, weights = np.polynomial.legendre.leggauss(_PER_SPAN)
+        order = np.arange(_PER_SPAN)
+        # From values at a span's nodes to coefficients of Legendre's polynomials, transposed.
+        self._coefficients = np.polynomial.legendre.legvander(nodes, _PER_SPAN - 1) * (order + 0.5)
+        self._coefficients *= weights[:, np.newaxis]
+
+    def densities(self, nets: Floats, weights: Floats) -> Floats:
+        """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, nodes, nodes, 5)."""
+        points, du, dv = grid_derivatives(nets, weights, (self.knots, self.knots), self.places, self.places)
+        across = np.cross(du, dv)
+        flux = np.sum(points * across, axis=-1, keepdims=True) / 3
+        return np.concatenate([flux, across, np.linalg.norm(across, axis=-1, keepdims=True)], axis=-1)
+
+    def over_square(self, nets: Floats, weights: Floats) -> Floats:
+        """Integrals over whole faces; shape (faces, 5)."""
+        sums = [np.zeros((0, 5))]
+        for first in range(0, len(nets), _FACES_AT_ONCE):
+            density = self.densities(nets[first : first + _FACES_AT_ONCE], weights)
+            sums.append(np.einsum("u,v,fuvk->fk", self.weights, self.weights, density, optimize=True))
+        return np.concatenate(sums)
+
+    def over(self, places: Floats, rates: Floats, density: Floats) -> Floats:
+        """Sum over places of a rate times the integral of a density along u, from -1 to the place.
+
+        Parameters
+        ----------
+        places : ndarray, shape (m, 2)
+            On the border.
+        rates : ndarray, shape (m,)
+            Of v along it, times the weight of the place in a quadrature along the border.
+        density : ndarray, shape (nodes, nodes, k)
+            Of one face.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+        """
+        spans = len(self.breaks) - 1
+        blocks = density.reshape(spans, _PER_SPAN, spans, _PER_SPAN, -1)
+        whole = np.einsum("sp,sptqk->stqk", self.weights.reshape(spans, -1), blocks)
+        before = np.cumsum(whole, axis=0) - whole
+        (span_u, _, up_to), (span_v, at, _) = (self._functions(x) for x in places.T)
+        # A place takes from one span along v: small products, where those of full matrices would be mostly of zeros.
+        along_u = before[span_u, span_v] + np.einsum("mp,mpqk->mqk", up_to, blocks[span_u, :, span_v])
+        return np.asarray(np.einsum("m,mq,mqk->k", rates, at, along_u))
+
+    def _functions(self, x: Floats) -> tuple[Integers, Floats, Floats]:
+        """Which span x is in; there Lagrange's polynomials on its nodes, and their integrals from its start to x."""
+        span = np.clip(np.searchsorted(self.breaks, x, side="right") - 1, 0, len(self.breaks) - 2)
+        half = np.diff(self.breaks)[span] / 2
+        local = (x - self.breaks[span]) / half - 1
+        legendre = np.polynomial.legendre.legvander(local, _PER_SPAN)
+        integrals = np.empty_like(legendre[:, :-1])
+        integrals[:, 0] = local + 1
+        integrals[:, 1:] = (legendre[:, 2:] - legendre[:, :-2]) / (2 * np.arange(1, _PER_SPAN) + 1)
+        values, sums = legendre[:, :-1] @ self._coefficients.T, integrals @ self._coefficients.T
+        return span.astype(np.int64), np.asarray(values), np.asarray(half[:, np.newaxis] * sums)

@@ -1,0 +1,1 @@
+"""Printers, and the check of what they can print."""

@@ -1,0 +1,300 @@
+"""Whether a printer can make a part: does it fit, are its walls thick enough, does resin drain, is it one piece."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.progress import Progress
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.lattice import Lattice
+from gyroid_cad.mesh.triangles.files import read_triangles
+from gyroid_cad.mesh.triangles.shells import Shells, shells_of
+from gyroid_cad.mesh.triangles.wall_thickness import measured_walls
+from gyroid_cad.printing.printers import Printer, printer_named
+from gyroid_cad.wall.complex import CellComplex, connected
+from gyroid_cad.wall.pore_limits import narrowest_opening, throat_diameter
+
+__all__ = ["PrintCheck", "print_check", "trapped_voids"]
+
+# At how many places the walls of a part that is known by its triangles alone are measured.
+_WALLS_MEASURED = 4000
+_UNITS = "STL in mm (STL has no unit: PreForm takes mm), 3MF says mm itself"
+# A part as long as the build volume, but for rounding, fits.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class PrintCheck:
+    """What a printer makes of a part; lengths in mm.
+
+    Attributes
+    ----------
+    printer : Printer
+    size : tuple of float
+        Of the part's box, along its own x, y, z.
+    orientation : tuple of int, optional
+        Which of the part's axes lie along the printer's: (0, 1, 2) as it is, (2, 1, 0) with x and z exchanged. None
+        if it fits in no way along the axes.
+    scale_to_fit : float
+        The largest scale at which it fits: below 1 it must be made smaller.
+    smallest_wall : float, optional
+        None where none was found.
+    walls_measured : int
+        At how many places; 0 if it is known from the lattice's description.
+    scale_for_supported_wall, scale_for_wall : float, optional
+        The scales from which on the smallest wall would pass as one that others support, and as one that stands free.
+    opening : float, optional
+        Diameter of the largest sphere that passes through a lattice's channels; unknown of triangles.
+    trapped_voids : int
+        Regions of empty space that do not reach outside.
+    pieces : int
+        That hang together by no edge.
+    open_edges, inside_out : int
+        Of triangles: edges not closed, and pieces turned inside out.
+    triangles : int
+    units : str
+    """
+
+    printer: Printer
+    size: tuple[float, float, float]
+    orientation: tuple[int, int, int] | None
+    scale_to_fit: float
+    smallest_wall: float | None
+    walls_measured: int
+    scale_for_supported_wall: float | None
+    scale_for_wall: float | None
+    opening: float | None
+    trapped_voids: int
+    pieces: int
+    open_edges: int
+    inside_out: int
+    triangles: int
+    units: str = _UNITS
+
+    @property
+    def fits(self) -> bool:
+        """Whether it fits the build volume, its axes along the printer's in one order or another."""
+        return self.orientation is not None
+
+    @property
+    def wall(self) -> str:
+        """ "good", "supported only" where it passes joined to others but not free, "too thin", or "unknown"."""
+        if self.smallest_wall is None:
+            return "unknown"
+        if self.smallest_wall >= self.printer.smallest_unsupported_wall:
+            return "good"
+        return "supported only" if self.smallest_wall >= self.printer.smallest_supported_wall else "too thin"
+
+    @property
+    def drains(self) -> bool | None:
+        """Whether channels are as wide as a drain hole is to be; None if that is not known."""
+        return None if self.opening is None else self.opening >= self.printer.smallest_drain_hole
+
+    @property
+    def suggested_scale(self) -> float | None:
+        """1 if it can be made as it is, else the scale next to it at which it fits and no wall is too thin, or None."""
+        least = self.scale_for_supported_wall or 0.0
+        return None if least > self.scale_to_fit else float(np.clip(1.0, least, self.scale_to_fit))
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing stands in the way; narrow channels, free edges and loose pieces are the user's to judge."""
+        sound = self.trapped_voids == 0 and self.open_edges == 0 and self.inside_out == 0
+        return self.fits and self.wall != "too thin" and sound
+
+    def as_dict(self) -> dict[str, Any]:
+        """The check as plain values, ready for JSON."""
+        judged = {name: getattr(self, name) for name in ("passed", "fits", "wall", "drains", "suggested_scale")}
+        return {**asdict(self), **judged}
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """Subject, finding and verdict, for a table."""
+        return [self._fit_row(), self._wall_row(), *self._drain_rows(), *self._whole_rows()]
+
+    def _fit_row(self) -> tuple[str, str, str]:
+        volume = " x ".join(f"{length:g}" for length in self.printer.build_volume)
+        finding = f"{' x '.join(f'{length:.4g}' for length in self.size)} mm in {volume} mm"
+        if self.orientation is None:
+            return "build volume", finding, f"too large: scale by {_rounded_down(self.scale_to_fit)}"
+        if self.orientation == (0, 1, 2):
+            return "build volume", finding, f"fits, up to a scale of {_rounded_down(self.scale_to_fit)}"
+        order = ", ".join("xyz"[axis] for axis in self.orientation)
+        return "build volume", finding, f"fits with its {order} along the printer's x, y, z"
+
+    def _wall_row(self) -> tuple[str, str, str]:
+        limits = self.printer.smallest_supported_wall, self.printer.smallest_unsupported_wall
+        asked = f"asked {limits[0]:g} mm supported, {limits[1]:g} mm free"
+        if self.smallest_wall is None:
+            return "smallest wall", f"none found; {asked}", "unknown"
+        how = f" at {self.walls_measured:,} places" if self.walls_measured else ""
+        verdict = {
+            "good": "good",
+            "supported only": f"good but at free edges; from a scale of {_rounded_up(self.scale_for_wall)} there too",
+            "too thin": f"too thin: passes from a scale of {_rounded_up(self.scale_for_supported_wall)}, "
+            f"free edges from {_rounded_up(self.scale_for_wall)}",
+        }[self.wall]
+        return "smallest wall", f"{self.smallest_wall:.4g} mm{how}; {asked}", verdict
+
+    def _drain_rows(self) -> list[tuple[str, str, str]]:
+        voids = "none" if self.trapped_voids == 0 else f"{self.trapped_voids}: resin cannot leave"
+        rows = [("trapped voids", f"{self.trapped_voids} regions that do not reach outside", voids)]
+        if self.opening is not None:
+            finding = f"spheres up to {max(self.opening, 0.0):.4g} mm pass; drain holes {self._hole:g} mm"
+            rows.append(("channels", finding, "drain" if self.drains else "narrow: rinse long, or larger cells"))
+        else:
+            finding = f"not measured in triangles; drain holes {self._hole:g} mm"
+            rows.append(("channels", finding, "unknown"))
+        return rows
+
+    @property
+    def _hole(self) -> float:
+        return self.printer.smallest_drain_hole
+
+    def _whole_rows(self) -> list[tuple[str, str, str]]:
+        closed = "closed" if not self.open_edges else f"{self.open_edges:,} open edges"
+        turned = f", {self.inside_out} inside out" if self.inside_out else ""
+        pieces = "one piece" if self.pieces == 1 else "prints as separate pieces"
+        return [
+            ("pieces", f"{self.pieces}", pieces),
+            ("triangles", f"{self.triangles:,}, {closed}{turned}", "not closed" if self.open_edges else "good"),
+            ("units", self.units, "mm"),
+        ]
+
+
+def print_check(
+    part: Lattice | str | os.PathLike[str] | tuple[NDArray[np.floating], NDArray[np.integer]],
+    printer: str | Printer = "form2",
+    deviation: float | None = None,
+    progress: Progress | None = None,
+) -> PrintCheck:
+    """Check whether a printer can make a part.
+
+    Of a lattice the smallest wall is known, and the channels' opening is worked out from the exact surface. Of
+    triangles the walls are measured through them, straight from one side to one that faces away, at some thousands of
+    places. Pieces are what hangs together; layers that begin in mid-air, which depend on how the part is turned, are
+    for the printer's own program to find.
+
+    Parameters
+    ----------
+    part : Lattice, path-like, or (vertices, triangles)
+        A lattice; an STL or 3MF file; or arrays of shapes (v, 3), in mm, and (t, 3).
+    printer : str or Printer
+        A key of ``gyroid_cad/printing/printers.toml``, or the path of a TOML file of one's own.
+    deviation : float, optional
+        Of a lattice's triangles, in mm, as of :meth:`gyroid_cad.Lattice.write`.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Returns
+    -------
+    PrintCheck
+
+    Raises
+    ------
+    ParameterError
+    """
+    chosen = printer if isinstance(printer, Printer) else printer_named(printer)
+    if isinstance(part, Lattice):
+        return _check_lattice(part, chosen, deviation, progress)
+    if isinstance(part, tuple):
+        vertices, triangles = part
+    elif isinstance(part, str | os.PathLike):
+        vertices, triangles = read_triangles(part)
+    else:
+        raise ParameterError("part", part, "a Lattice, an STL or 3MF file, or arrays of vertices and triangles")
+    shells = shells_of(vertices, triangles)
+    walls = measured_walls(vertices, triangles, _WALLS_MEASURED)
+    smallest = float(walls[0]) if len(walls) else None
+    return _checked(chosen, shells.high - shells.low, smallest, len(walls), None, shells)
+
+
+def _check_lattice(
+    lattice: Lattice, printer: Printer, deviation: float | None, progress: Progress | None
+) -> PrintCheck:
+    laid = lattice.laid(progress)
+    grading = laid.recipe.grading
+    opening = (
+        throat_diameter(grading.surface, grading.cell_size, laid.thinnest)
+        if grading.uniform
+        else narrowest_opening(laid.wall, grading, lattice.cells)
+    )
+    if laid.recipe.boxed:
+        from gyroid_cad.kernel.stl import meshed
+
+        limit = min(lattice.cell_size / 1000, laid.thinnest / 10) if deviation is None else deviation
+        shells = shells_of(*meshed(lattice.solid(progress), "triangles", limit))
+        return _checked(printer, shells.high - shells.low, laid.thinnest, 0, opening, shells)
+    low, high = laid.bounding_box()
+    count = lattice.triangles(deviation, progress).triangulation.triangle_count
+    voids, pieces = trapped_voids(laid.complex), laid.complex.component_count
+    return _checked(printer, high - low, laid.thinnest, 0, opening, (voids, pieces, count))
+
+
+def trapped_voids(complex: CellComplex) -> int:
+    """How many regions of empty space within a lattice of whole patches do not reach outside.
+
+    The wall's surface falls into shells: both faces of every patch, joined across shared edges on either side and,
+    where an edge is free, to each other by its side wall. Every piece of the lattice has one shell outside; each
+    further one goes round a void (Alexander duality: pieces and voids together are as many as shells).
+    """
+    first, second = complex.edge_patches[~complex.free].T
+    rim = complex.edge_patches[complex.free, 0]
+    count = complex.patch_count
+    one = np.concatenate([first, first + count, rim])
+    other = np.concatenate([second, second + count, rim + count])
+    return int(connected(2 * count, one, other).max()) + 1 - complex.component_count
+
+
+def _checked(
+    printer: Printer,
+    extents: NDArray[np.float64],
+    smallest_wall: float | None,
+    walls_measured: int,
+    opening: float | None,
+    found: Shells | tuple[int, int, int],
+) -> PrintCheck:
+    x, y, z = extents.tolist()
+    volume = np.array(printer.build_volume)
+    scales = {order: float(np.min(volume / extents[list(order)])) for order in permutations(range(3))}
+    # As it stands, if it fits so.
+    fitting = next((order for order, scale in scales.items() if scale >= 1 - _ROUNDING), None)
+    if isinstance(found, Shells):
+        counts = found.trapped_voids, found.pieces, found.open_edges, found.inside_out, int(found.triangles.sum())
+    else:
+        voids, pieces, triangles = found
+        counts = voids, pieces, 0, 0, triangles
+    wall = smallest_wall
+    return PrintCheck(
+        printer=printer,
+        size=(x, y, z),
+        orientation=None if fitting is None else (fitting[0], fitting[1], fitting[2]),
+        scale_to_fit=max(scales.values()),
+        smallest_wall=wall,
+        walls_measured=walls_measured,
+        scale_for_supported_wall=None if wall is None else printer.smallest_supported_wall / wall,
+        scale_for_wall=None if wall is None else printer.smallest_unsupported_wall / wall,
+        opening=opening,
+        trapped_voids=counts[0],
+        pieces=counts[1],
+        open_edges=counts[2],
+        inside_out=counts[3],
+        triangles=counts[4],
+    )
+
+
+def _rounded_down(scale: float) -> str:
+    """Three digits, none of them too large."""
+    unit = 10.0 ** (np.floor(np.log10(scale)) - 2)
+    return f"{np.floor(scale / unit * (1 + _ROUNDING)) * unit:.3g}"
+
+
+def _rounded_up(scale: float | None) -> str:
+    assert scale is not None
+    unit = 10.0 ** (np.floor(np.log10(scale)) - 2)
+    return f"{np.ceil(scale / unit * (1 - _ROUNDING)) * unit:.3g}"

@@ -1,0 +1,1 @@
+"""Pictures without a graphics card: for notebooks, the report and the README."""

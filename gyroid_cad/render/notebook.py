@@ -1,0 +1,101 @@
+"""What a notebook shows of a lattice or a filled part: a picture and a small table, which open offline.
+
+IPython asks objects for ``_repr_mimebundle_`` (its documentation, *Integrating your objects with IPython*). The picture
+stands in the HTML itself, for notebooks, and once more by itself, for what knows no HTML.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gyroid_cad.errors import GyroidError
+from gyroid_cad.mesh.triangles.corners import indexed_triangles
+from gyroid_cad.mesh.triangles.triangulation import triangulated
+from gyroid_cad.render.picture import Vector, data_uri, draw, png
+from gyroid_cad.wall.offset import Wall
+
+if TYPE_CHECKING:
+    from gyroid_cad.kernel.solid import KernelShape
+
+__all__ = ["MimeBundle", "mime_bundle", "shape_picture", "wall_picture"]
+
+# What IPython takes: the data by media type, and what is to be known of them.
+MimeBundle = tuple[dict[str, Any], dict[str, Any]]
+
+# Of triangles from what they stand for, in pixels: not to be seen.
+_DEVIATION = 0.5
+_ANGLE = 20.0
+_CELL = 'style="text-align: left; padding: 0.1em 1.2em 0.1em 0"'
+
+
+def wall_picture(wall: Wall, size: tuple[int, int], camera: Vector) -> bytes:
+    """A wall of whole patches as a PNG file; no kernel is asked.
+
+    Parameters
+    ----------
+    wall : Wall
+    size : tuple of int
+        Width and height in pixels.
+    camera : tuple of float
+        Direction to the viewer.
+
+    Raises
+    ------
+    ParameterError
+        If a patch would take too many triangles.
+    """
+    low, high = wall.bounding_box()
+    triangulation = triangulated(wall, _deviation(float(np.linalg.norm(high - low)), size))
+    return png(draw(*indexed_triangles(triangulation), size, camera))
+
+
+def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> bytes:
+    """A shape of the kernel as a PNG file, meshed by the kernel.
+
+    Raises
+    ------
+    ExportError
+        If the kernel's mesher fails.
+    """
+    from gyroid_cad.kernel.stl import diagonal, meshed
+
+    return png(draw(*meshed(shape, "the picture", _deviation(diagonal(shape), size), _ANGLE), size, camera))
+
+
+def mime_bundle(title: str, rows: Callable[[], Sequence[tuple[str, str]]], picture: Callable[[], bytes]) -> MimeBundle:
+    """A table and a picture, or why there is none.
+
+    Parameters
+    ----------
+    title : str
+    rows : callable
+        Gives what is to be read, line by line.
+    picture : callable
+        Gives a PNG file.
+
+    Returns
+    -------
+    tuple of (dict, dict)
+        With "text/html" and, if there is a picture, "image/png".
+    """
+    data: dict[str, Any] = {}
+    shown, lines = "", [("", title)]
+    try:
+        lines += rows()
+        address = data_uri(picture())
+        data["image/png"] = address.partition(",")[2]
+        shown = f'<img alt="{escape(title)}" src="{address}">'
+    except GyroidError as problem:
+        # An object that cannot be shown is no reason for a traceback in place of it.
+        lines.append(("not shown", str(problem)))
+    table = "".join(f"<tr><th {_CELL}>{escape(a)}</th><td {_CELL}>{escape(b)}</td></tr>" for a, b in lines)
+    data["text/html"] = f"<div>{shown}<table>{table}</table></div>"
+    return data, {}
+
+
+def _deviation(diagonal: float, size: tuple[int, int]) -> float:
+    return _DEVIATION * diagonal / max(size)

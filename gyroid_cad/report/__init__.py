@@ -1,0 +1,1 @@
+"""One page, or JSON, of a lattice or a file."""

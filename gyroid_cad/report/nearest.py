@@ -1,0 +1,194 @@
+"""How far places are from the wall's faces, and where: samples of the faces, and what the faces do round them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.nurbs.surface import NurbsSurface, basis
+from gyroid_cad.wall.offset import SIDES, Wall
+
+__all__ = ["Feet", "WallFaces", "tree_of", "wall_faces"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+# Samples of all faces together, which take 250 bytes each.
+_MOST_SAMPLES = 800_000
+_FEWEST_STEPS, _MOST_STEPS = 6, 48
+# So many queries and neighbours at a time that what is computed for them stays small.
+_PAIRS_AT_ONCE = 200_000
+# In steps between samples: the foot belongs to the nearest sample along each side, and a little is overlap.
+_OWN_FOOT = 0.6
+# A place lies in the wall only if it stands over its foot: beyond a free edge the foot is aside.
+_UPRIGHT = 0.9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Feet:
+    """The nearest places of the faces, for each of some points and of the nearest samples to it.
+
+    Attributes
+    ----------
+    away : ndarray, shape (points, neighbours, 3)
+        From the foot to the point, in mm.
+    distance : ndarray, shape (points, neighbours)
+        In mm.
+    outside : ndarray of bool, shape (points, neighbours)
+        Whether the point is not behind the foot's face, in the wall.
+    side : ndarray of int, shape (points, neighbours)
+        Which face the foot is on, 0 or 1.
+    found : ndarray of bool, shape (points, neighbours)
+        Whether there is a foot next to the sample; else the sample itself stands for it.
+    """
+
+    away: Floats
+    distance: Floats
+    outside: Booleans
+    side: Integers
+    found: Booleans
+
+    def nearest(self) -> tuple[Floats, Booleans, Integers]:
+        """Distance, whether outside the wall, and face of the nearest foot of each point."""
+        rows, best = np.arange(len(self.distance)), np.argmin(self.distance, axis=1)
+        return self.distance[rows, best], self.outside[rows, best], self.side[rows, best]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallFaces:
+    """Samples of the faces of a wall, with the first and second derivatives there.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        In mm.
+    derivatives : ndarray, shape (5, n, 3)
+        By u, v, uu, uv and vv.
+    outwards : ndarray, shape (n, 3)
+        Unit normals out of the wall.
+    side : ndarray of int, shape (n,)
+        Which face, 0 or 1.
+    step : float
+        Between samples, in parameters.
+    period : float, optional
+        In mm, along x, y and z alike, if the wall goes on endlessly.
+    tree : scipy.spatial.cKDTree
+        Of the points.
+    """
+
+    points: Floats
+    derivatives: Floats
+    outwards: Floats
+    side: Integers
+    step: float
+    period: float | None
+    tree: Any
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    def feet(self, places: Floats, neighbours: int) -> Feet:
+        """Feet on the faces of perpendiculars from places, one near each of the nearest samples.
+
+        From the sample one step of Newton's method for the foot (The NURBS Book, eq. (6.6)), with the surface taken as
+        its quadratic there: so the distance is true to the third order of the samples' spacing.
+
+        Parameters
+        ----------
+        places : ndarray, shape (m, 3)
+            In mm.
+        neighbours : int
+            How many samples near each to start from.
+        """
+        size = max(1, _PAIRS_AT_ONCE // neighbours)
+        parts = [self._feet(places[first : first + size], neighbours) for first in range(0, len(places), size)]
+        away, distance, outside, side, found = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return Feet(away, distance, outside, side, found)
+
+    def _feet(self, places: Floats, neighbours: int) -> tuple[Floats, Floats, Booleans, Integers, Booleans]:
+        wrapped = places if self.period is None else np.mod(places, self.period)
+        nearest = np.asarray(self.tree.query(wrapped, k=list(range(1, neighbours + 1)))[1])
+        apart = wrapped[:, np.newaxis] - self.points[nearest]
+        if self.period is not None:
+            apart -= self.period * np.round(apart / self.period)
+        du, dv, duu, duv, dvv = self.derivatives[:, nearest]
+        a, b, c = dot(du, du) - dot(apart, duu), dot(du, dv) - dot(apart, duv), dot(dv, dv) - dot(apart, dvv)
+        along_u, along_v = dot(apart, du), dot(apart, dv)
+        determinant = a * c - b * b
+        # Past the centre of curvature there is no foot nearby: the sample itself stands for it.
+        sound = (determinant > 0) & (a > 0)
+        determinant = np.where(sound, determinant, 1.0)
+        u, v = (c * along_u - b * along_v) / determinant, (a * along_v - b * along_u) / determinant
+        # A foot further away is that of another sample, and known better from there.
+        sound &= np.maximum(np.abs(u), np.abs(v)) <= _OWN_FOOT * self.step
+        u, v = (np.where(sound, along, 0.0)[..., np.newaxis] for along in (u, v))
+        away = apart - (du * u + dv * v + duu * (u * u / 2) + duv * (u * v) + dvv * (v * v / 2))
+        normal = self.outwards[nearest]
+        distance = np.linalg.norm(away, axis=-1)
+        inside = dot(away, normal) < -_UPRIGHT * distance
+        return away, distance, ~inside, self.side[nearest], sound
+
+
+def wall_faces(wall: Wall, period: float | None) -> WallFaces:
+    """Samples of a wall's faces, evenly spaced on every patch.
+
+    Parameters
+    ----------
+    wall : Wall
+    period : float, optional
+        Of an endless wall, in mm: then of patches that are alike one is sampled.
+    """
+    patches = np.arange(wall.complex.patch_count)
+    if period is not None:
+        patches = np.unique(wall.patch_net, return_index=True)[1]
+    affordable = int(np.sqrt(_MOST_SAMPLES / (len(SIDES) * len(patches))))
+    steps = int(np.clip(affordable - 1, _FEWEST_STEPS, _MOST_STEPS))
+    values = _derivatives(wall, wall.nets[wall.patch_net[patches]], np.linspace(-1, 1, steps + 1))
+    shape = values.shape[1:-1]
+    points = values[0] + wall.shifts[wall.patch_shift[patches]][:, np.newaxis, np.newaxis]
+    side = np.broadcast_to(np.arange(2)[np.newaxis, :, np.newaxis], shape).ravel()
+    normals = np.cross(values[1], values[2]).reshape(-1, 3)
+    normals *= (np.where(side == 1, 1.0, -1.0) / np.linalg.norm(normals, axis=1))[:, np.newaxis]
+    points = points.reshape(-1, 3)
+    if period is not None:
+        points = np.mod(points, period)
+        # Rounding may leave a small negative number at the period itself.
+        points[points >= period] = 0.0
+    derivatives = values[1:].reshape(5, -1, 3)
+    return WallFaces(points, derivatives, normals, side, 2 / steps, period, tree_of(points, period))
+
+
+def tree_of(points: Floats, period: float | None) -> Any:
+    """A tree in which to look up points (``scipy.spatial.cKDTree``), which repeat if there is a period."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points, boxsize=period)  # type: ignore[arg-type]
+
+
+def _derivatives(wall: Wall, nets: Floats, samples: Floats) -> Floats:
+    """Points, and derivatives by u, v, uu, uv and vv; shape (6, patches, 2, samples squared, 3)."""
+    count = len(samples)
+    orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    if np.ptp(wall.weights) > 0:
+        found = np.empty((6, len(nets), 2, count, count, 3))
+        grid = samples[:, np.newaxis], samples[np.newaxis]
+        for patch, side in np.ndindex(len(nets), 2):
+            surface = NurbsSurface(nets[patch, side], wall.weights, wall.knots, wall.knots)
+            every = surface.derivatives(*grid, order=2)
+            for index, order in enumerate(orders):
+                found[index, patch, side] = every[order]
+        return found.reshape(6, len(nets), 2, count**2, 3)
+    functions = [basis(wall.knots, 3, samples, order) for order in range(3)]
+    return np.stack(
+        [
+            np.einsum("ai,bj,psijc->psabc", functions[k], functions[m], nets, optimize=True).reshape(
+                len(nets), 2, count**2, 3
+            )
+            for k, m in orders
+        ]
+    )

@@ -1,0 +1,271 @@
+"""Curves in which the wall's faces cross planes, found in the parameter square and fitted there and in space.
+
+A crossing is a level curve of one coordinate. Where it enters and leaves the square is found on the square's sides
+alone, so that neighbours who share a side find the same places. From every entry the curve is followed to its exit;
+stations evenly spread along it are then made exact by Newton's method and interpolated by one cubic spline for the
+curve in the square and one for that in space, with the same parameter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.trim.edge_crossings import AXES, Faces, Rims, plane_heights
+
+__all__ = ["Sections", "plane_sections", "section_knots"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# In the square, whose sides are 2 long; finer where a curve is not followed to an exit.
+_STEPS = (0.1, 0.025)
+_LONGEST = 8.0
+# Samples along each side, to see that no curve closes within the square.
+_GRID = 33
+# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
+_STATIONS = (16, 32, 64, 128)
+_CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
+_NEWTON_STEPS = 8
+# Of what is solved for a spline; stations evenly spread give 4.
+_WORST_CONDITION = 1e3
+# A curve in the square that swings out so far is no fit.
+_WIDEST = 1.1
+# Of Newton's method in the square: near a saddle it would leap out of where the face is defined.
+_LONGEST_STEP = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sections:
+    """Curves in which faces cross planes, what is wanted on their left.
+
+    Attributes
+    ----------
+    face, plane : ndarray of int, shape (curves,)
+    start, end : ndarray of int, shape (curves,)
+        Rim crossings that a curve joins.
+    parameters : list of ndarray, shape (m, 2)
+        Control points of each curve in the square.
+    points : list of ndarray, shape (m, 3)
+        Control points in space, as many, in mm along the box's axes.
+    deviation : ndarray, shape (curves,)
+        Of the two from each other, in mm.
+    """
+
+    face: Integers
+    plane: Integers
+    start: Integers
+    end: Integers
+    parameters: list[Floats]
+    points: list[Floats]
+    deviation: Floats
+
+    def __len__(self) -> int:
+        return len(self.face)
+
+    def in_square(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
+        """Places in the square, or their rate of change; shape (q, 2)."""
+        return _on_section(self.parameters[curve], t, derivative)
+
+    def in_space(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
+        """Points in mm, or their rate of change; shape (q, 3)."""
+        return _on_section(self.points[curve], t, derivative)
+
+
+@lru_cache
+def section_knots(control_points: int) -> Floats:
+    """Knots on [0, 1] of a cubic through as many evenly spaced stations, none at the second and last but one."""
+    inner = np.linspace(0, 1, control_points)[2:-2]
+    return np.concatenate([np.zeros(4), inner, np.ones(4)])
+
+
+def _on_section(control: Floats, t: Floats, derivative: int) -> Floats:
+    return np.asarray(_section_basis(len(control), np.asarray(t, float).tobytes(), derivative) @ control)
+
+
+@lru_cache(maxsize=256)
+def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
+    """Most curves are looked at in the same places: at evenly spread ones, or at Gauss points from end to end."""
+    return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
+
+
+def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
+    """The curves between the crossings of the sides.
+
+    Parameters
+    ----------
+    faces : Faces
+    rims : Rims
+    size : float
+        Of a cell in mm, by which closeness is measured.
+
+    Raises
+    ------
+    KernelError
+        If a curve cannot be followed from one side to another: then the face touches the plane. Or if one closes
+        within the square, as only a wall that varies wildly has them.
+    """
+    _require_open_curves(faces)
+    starts = np.flatnonzero(rims.entering)
+    for step in _STEPS:
+        paths = _followed(faces, rims, starts, step)
+        ends = _exits(rims, starts, paths, 2 * step)
+        if ends is not None:
+            break
+    else:
+        raise KernelError("a face of the lattice touches the box: where they cross cannot be followed")
+    ways = [np.vstack([path[:-1], rims.places[end]]) for path, end in zip(paths, ends.tolist(), strict=True)]
+    return _fitted_closely(faces, rims, starts, ends, ways, size)
+
+
+def _require_open_curves(faces: Faces) -> None:
+    """Wherever a face lies above a plane, or below, one can go on doing so to a side of the square."""
+    face, plane = np.nonzero(~np.isnan(faces.levels))
+    through = basis(faces.knots, 3, np.linspace(-1, 1, _GRID))
+    heights = faces.nets[face, ..., AXES[plane]] - faces.levels[face, plane][:, np.newaxis, np.newaxis]
+    above = through @ (faces.weights * heights) @ through.T > 0
+    reached = np.ones_like(above)
+    reached[:, 1:-1, 1:-1] = False
+    along_u, along_v = above[:, 1:] == above[:, :-1], above[:, :, 1:] == above[:, :, :-1]
+    count = 0
+    while count < (count := int(np.count_nonzero(reached))):
+        reached[:, 1:] |= reached[:, :-1] & along_u
+        reached[:, :-1] |= reached[:, 1:] & along_u
+        reached[:, :, 1:] |= reached[:, :, :-1] & along_v
+        reached[:, :, :-1] |= reached[:, :, 1:] & along_v
+    if count < above.size:
+        raise KernelError("a face of the lattice bulges through a side of the box")
+
+
+def _followed(faces: Faces, rims: Rims, starts: Integers, step: float) -> list[Floats]:
+    """Places along the curve from each start until it has left the square, the last one outside."""
+    place = rims.places[starts]
+    paths = [[point] for point in place]
+    live = np.arange(len(starts))
+    for _ in range(int(_LONGEST / step)):
+        face, plane = rims.face[starts[live]], rims.plane[starts[live]]
+        onward = _along(faces, face, plane, place)
+        place = place + step * _along(faces, face, plane, place + step / 2 * onward)
+        for _ in range(2):
+            place = place + _towards(*plane_heights(faces, face, plane, *place.T))
+        for curve, point in zip(live.tolist(), place, strict=True):
+            paths[curve].append(point)
+        inside = np.all(np.abs(place) < 1, axis=1)
+        live, place = live[inside], place[inside]
+        if not len(live):
+            break
+    return [np.array(path) for path in paths]
+
+
+def _along(faces: Faces, face: Integers, plane: Integers, place: Floats) -> Floats:
+    """The unit direction that keeps what is higher on its left."""
+    slopes = plane_heights(faces, face, plane, *place.T)[1]
+    turned = np.stack([slopes[:, 1], -slopes[:, 0]], axis=-1)
+    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
+
+
+def _towards(height: Floats, slopes: Floats) -> Floats:
+    """A Newton step back to the level curve, straight across it; short where the face all but touches the plane."""
+    steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
+    step = -slopes * (height / steepness)[..., np.newaxis]
+    length = np.linalg.norm(step, axis=-1, keepdims=True)
+    return np.asarray(step * np.minimum(1.0, _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)))
+
+
+def _exits(rims: Rims, starts: Integers, paths: list[Floats], reach: float) -> Integers | None:
+    """The crossing at which each path leaves; None if they are not one for one."""
+    leaving = np.flatnonzero(~rims.entering)
+    if len(leaving) != len(starts):
+        return None
+    places = rims.places
+    alike: dict[tuple[int, int], list[int]] = {}
+    for index in leaving.tolist():
+        alike.setdefault((int(rims.face[index]), int(rims.plane[index])), []).append(index)
+    ends = []
+    for start, path in zip(starts.tolist(), paths, strict=True):
+        candidates = alike.get((int(rims.face[start]), int(rims.plane[start])), [])
+        if not candidates:
+            return None
+        distance = np.linalg.norm(places[candidates] - (path[-1] + path[-2]) / 2, axis=1)
+        nearest = int(np.argmin(distance))
+        if distance[nearest] > reach:
+            return None
+        ends.append(candidates.pop(nearest))
+    return np.array(ends)
+
+
+def _fitted_closely(
+    faces: Faces, rims: Rims, starts: Integers, ends: Integers, ways: list[Floats], size: float
+) -> Sections:
+    """Each curve with as few control points as keep the one in the square and the one in space together."""
+    face, plane = rims.face[starts], rims.plane[starts]
+    none = np.zeros((0, 3))
+    found = Sections(face, plane, starts, ends, [none] * len(face), [none] * len(face), np.full(len(face), np.inf))
+    left = np.arange(len(face))
+    for count in _STATIONS:
+        if not len(left):
+            break
+        parameters, points, deviation = _fitted(faces, face[left], plane[left], [ways[k] for k in left.tolist()], count)
+        for index, curve in enumerate(left.tolist()):
+            found.parameters[curve], found.points[curve] = parameters[index], points[index]
+        found.deviation[left] = deviation
+        left = left[deviation > _CLOSE * size]
+    worst = found.deviation.max(initial=0.0)
+    if not worst <= _NEAR_ENOUGH * size:
+        raise KernelError(f"a curve where the lattice crosses the box was fitted to {worst:.2g} mm only")
+    return found
+
+
+def _fitted(
+    faces: Faces, face: Integers, plane: Integers, ways: list[Floats], count: int
+) -> tuple[Floats, Floats, Floats]:
+    """Control points in the square and in space, and how far the two curves are from each other."""
+    even = np.linspace(0, 1, count + 1)
+    stations = np.array([_spread(way, _run(way), even) for way in ways])
+    points = _onto_level(faces, face, plane, stations)
+    # Evenly spread in the square, then in space.
+    stations = np.array([_spread(way, _run(some), even) for way, some in zip(stations, points, strict=True)])
+    stations[:, [0, -1]] = [[way[0], way[-1]] for way in ways]
+    points = _onto_level(faces, face, plane, stations)
+    # Parameters by chord length: nearly even, and smooth however the stations are not quite so.
+    t = np.array([_run(some) for some in points])
+    through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
+    # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
+    crowded = ~np.all(np.isfinite(t), axis=1)
+    through[crowded] = np.eye(count + 1)
+    crowded |= np.linalg.cond(through) > _WORST_CONDITION
+    through[crowded] = np.eye(count + 1)
+    control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
+    between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
+    astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
+    exact = faces.points(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))
+    deviation = np.linalg.norm(exact - between[..., 2:], axis=-1).max(axis=1)
+    return control[..., :2], control[..., 2:], np.where(crowded | astray, np.inf, deviation)
+
+
+def _onto_level(faces: Faces, face: Integers, plane: Integers, stations: Floats) -> Floats:
+    """Move stations between the ends onto the level curve, in place; their points in space."""
+    for _ in range(_NEWTON_STEPS):
+        step = _towards(*plane_heights(faces, face, plane, stations[..., 0], stations[..., 1]))
+        stations[:, 1:-1] += step[:, 1:-1]
+        if np.max(np.abs(step[:, 1:-1])) < 1e-13:
+            break
+    points = faces.points(face, stations[..., 0], stations[..., 1])
+    points[np.arange(len(face)), :, AXES[plane]] = faces.levels[face, plane][:, np.newaxis]
+    return points
+
+
+def _run(points: Floats) -> Floats:
+    """Length of the chords up to each point, in parts of all."""
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.asarray(run / run[-1])
+
+
+def _spread(way: Floats, run: Floats, t: Floats) -> Floats:
+    """Places of a way in the square at parameters t, where its own points have parameters ``run``."""
+    return np.stack([np.interp(t, run, way[:, axis]) for axis in (0, 1)], axis=-1)

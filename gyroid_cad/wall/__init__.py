@@ -1,0 +1,1 @@
+"""The wall: cell complex, grading, offset control nets, and whether they meet themselves."""

@@ -1,0 +1,229 @@
+"""The patches of an endless lattice that a part needs: where they are, and which the part's boundary crosses.
+
+Patches wholly inside or outside the part need no cutting. Those that the boundary stays clear of hang together by
+their edges, and each such group is all inside or all outside: one point tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.surface.families import USUAL, MinimalSurface
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
+from gyroid_cad.wall.complex import CellComplex, build_complex, connected
+from gyroid_cad.wall.exact import laid_patches, patch_points, patch_points_and_normals
+from gyroid_cad.wall.grading import Grading
+
+__all__ = [
+    "AT_HOME",
+    "CROSSING",
+    "INSIDE",
+    "OUTSIDE",
+    "PHASES",
+    "SIDE_SAMPLES",
+    "Frame",
+    "covering_complex",
+    "nearest_offsets",
+    "patch_sides",
+    "periodic_offsets",
+    "sides_of_points",
+    "wall_extremes",
+]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+OUTSIDE, CROSSING, INSIDE = -1, 0, 1
+# Along each side of a patch, whose middle is among them.
+SIDE_SAMPLES = 7
+# Of the lattice, in cell sizes: tangent or nearly coincident faces cannot be cut; a shift that no symmetry knows parts
+# them.
+PHASES = ((0.0, 0.0, 0.0), (0.0031, 0.0047, 0.0023), (-0.0053, 0.0029, 0.0071))
+_OFFSET_SAMPLES = 17
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """Where the lattice stands: p -> rotation p + origin, from its own space to that of the part.
+
+    Attributes
+    ----------
+    origin : ndarray, shape (3,)
+        In mm.
+    rotation : ndarray, shape (3, 3)
+    """
+
+    origin: Floats
+    rotation: Floats
+
+    def own(self, points: Floats) -> Floats:
+        """Points of the part's space in the lattice's own; shape (..., 3)."""
+        return (points - self.origin) @ self.rotation
+
+    def placed(self, points: Floats) -> Floats:
+        """Points of the lattice's own space in the part's; shape (..., 3)."""
+        return points @ self.rotation.T + self.origin
+
+
+AT_HOME = Frame(np.zeros(3), np.eye(3))
+
+
+def covering_complex(
+    low: Floats, high: Floats, frame: Frame, cell_size: float, reach: float, surface: MinimalSurface = USUAL
+) -> CellComplex:
+    """All patches that come within reach of a box in the part's space.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (3,)
+        Corners of the box, in mm.
+    frame : Frame
+    cell_size : float
+        In mm.
+    reach : float
+        Half the wall or whatever else stands off the mid-surface, in mm.
+    surface : MinimalSurface
+    """
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    own = frame.own(corners)
+    placements = surface.cell
+    margin = reach + _patch_radius(placements) * cell_size
+    first = np.floor((own.min(axis=0) - margin) / cell_size).astype(np.int64) - 1
+    last = np.ceil((own.max(axis=0) + margin) / cell_size).astype(np.int64) + 1
+    centres = placements.translations / CELL_QUARTERS * cell_size
+
+    def near(placement: Integers, cell: Integers) -> Booleans:
+        places = frame.placed(centres[placement] + cell * cell_size)
+        return np.asarray(np.all((places > low - margin) & (places < high + margin), axis=1))
+
+    nx, ny, nz = (last - first).tolist()
+    x, y, z = first.tolist()
+    return build_complex((nx, ny, nz), placements, first=(x, y, z), wanted=near)
+
+
+def _patch_radius(placements: Placements) -> float:
+    """From the middle of a patch to its corners, which are furthest from it, in cell sizes."""
+    return float(np.linalg.norm(placements.patch.corner_array, axis=1).max()) / CELL_QUARTERS
+
+
+def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> tuple[float, float]:
+    """The thinnest and the thickest wall of patches that may come near a box in the part's space, in mm."""
+    if grading.uniform:
+        return float(grading.thickness), float(grading.thickness)  # type: ignore[arg-type]
+    reach = grading.surface.tube.largest_thickness / 2 * grading.cell_size
+    complex = covering_complex(low, high, frame, grading.cell_size, reach, grading.surface)
+    walls = [laid.thickness for _, laid in laid_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES))]
+    return min(float(some.min()) for some in walls), max(float(some.max()) for some in walls)
+
+
+def patch_sides(
+    complex: CellComplex,
+    frame: Frame,
+    cell_size: float,
+    reach: float,
+    distance: Callable[[Floats], Floats],
+    holds: Callable[[Floats], Booleans],
+) -> Integers:
+    """Which patches lie inside a part, outside it, or may be crossed by its boundary; shape (patches,).
+
+    Parameters
+    ----------
+    complex : CellComplex
+    frame : Frame
+    cell_size, reach : float
+        In mm.
+    distance : callable
+        Of points (n, 3) in the part's space: no more than their distance from its boundary, in mm.
+    holds : callable
+        Which of some points lie inside the part.
+    """
+    points = frame.placed(patch_points(complex, cell_size, np.linspace(-1, 1, SIDE_SAMPLES)))
+    return sides_of_points(complex, points, reach, distance, holds)
+
+
+def sides_of_points(
+    complex: CellComplex,
+    points: Floats,
+    reach: float,
+    distance: Callable[[Floats], Floats],
+    holds: Callable[[Floats], Booleans],
+) -> Integers:
+    """The same, of patches wherever they lie; shape (patches,).
+
+    Parameters
+    ----------
+    complex : CellComplex
+    points : ndarray, shape (patches, :data:`SIDE_SAMPLES` squared, 3)
+        Of the mid-surface, on a grid, in mm.
+    reach : float
+        In mm.
+    distance, holds : callable
+        As of :func:`patch_sides`.
+    """
+    # Every place of a patch is within half a step between samples, along both sides, of one of them.
+    grid = points.reshape(-1, SIDE_SAMPLES, SIDE_SAMPLES, 3)
+    steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)]
+    gap = sum(steps) / 2
+    middle = points[:, SIDE_SAMPLES**2 // 2]
+    radius = np.linalg.norm(points - middle[:, np.newaxis], axis=-1).max(axis=1) + gap
+    clear = distance(middle) > radius + reach
+    near = np.flatnonzero(~clear)
+    clear[near] = distance(points[near].reshape(-1, 3)).reshape(len(near), SIDE_SAMPLES**2).min(axis=1) > gap + reach
+    sides = np.full(complex.patch_count, CROSSING)
+    both = complex.edge_patches[~complex.free]
+    both = both[clear[both].all(axis=1)]
+    group = connected(complex.patch_count, both[:, 0], both[:, 1])
+    groups, first = np.unique(group[clear], return_index=True)
+    inside = np.zeros(complex.patch_count, dtype=bool)
+    inside[groups] = holds(middle[np.flatnonzero(clear)[first]])
+    sides[clear] = np.where(inside[group[clear]], INSIDE, OUTSIDE)
+    return sides
+
+
+def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: MinimalSurface = USUAL) -> Floats:
+    """How far points of the part's space lie from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
+
+    Parameters
+    ----------
+    frame : Frame
+    cell_size : float
+        In mm.
+    points : ndarray, shape (n, 3)
+    surface : MinimalSurface
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        In mm; positive on the side that the common normal points to.
+    """
+    cell = covering_complex(np.zeros(3), np.full(3, cell_size), AT_HOME, cell_size, 0.0, surface)
+    places, normals = patch_points_and_normals(cell, cell_size, np.linspace(-1, 1, _OFFSET_SAMPLES))
+    own = np.mod(frame.own(points), cell_size)
+    return nearest_offsets(places, normals, own)[0]
+
+
+def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
+    """How far points lie from samples of a surface, along its normal.
+
+    Parameters
+    ----------
+    places, normals : ndarray, shape (..., 3)
+        Of the surface.
+    points : ndarray, shape (n, 3)
+
+    Returns
+    -------
+    offsets : ndarray, shape (n,)
+    nearest : ndarray of int, shape (n,)
+        Flat indices of the samples.
+    """
+    from scipy.spatial import cKDTree
+
+    places, normals = places.reshape(-1, 3), normals.reshape(-1, 3)
+    nearest = np.asarray(cKDTree(places).query(points)[1], dtype=np.int64)
+    return np.asarray(np.sum((points - places[nearest]) * normals[nearest], axis=1)), nearest

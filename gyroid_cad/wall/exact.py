@@ -1,0 +1,222 @@
+"""The exact wall of a lattice that varies, without any fit: where it is, and its volume."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.surface.patch import PARAMETERISATIONS
+from gyroid_cad.surface.symmetry import QUARTER
+from gyroid_cad.surface.weierstrass import Family
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.grading import Grading, Laid
+
+__all__ = [
+    "ExactMeasures",
+    "block_volume",
+    "differentiation_matrix",
+    "exact_measures",
+    "interpolation_matrix",
+    "laid_patches",
+    "patch_points",
+    "patch_points_and_normals",
+    "sampled_place",
+]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_QUADRATURE_POINTS = 16
+_BLOCK_POINTS = 4
+# So few that what is computed for them stays in the processor's cache.
+_PATCHES_AT_ONCE = 48
+
+
+def laid_patches(
+    complex: CellComplex, grading: Grading, samples: Floats, patches: Integers | None = None
+) -> Iterator[tuple[slice, Laid]]:
+    """The exact mid-surface at a grid of samples of every patch, some patches at a time.
+
+    Parameters
+    ----------
+    complex : CellComplex
+    grading : Grading
+    samples : ndarray, shape (m,)
+        Along each side of a patch.
+    patches : ndarray of int, optional
+        Which patches; all if left out.
+
+    Yields
+    ------
+    slice
+        Of ``patches``.
+    Laid
+        At patches x m x m points; du x dv along the normal.
+    """
+    patches = np.arange(complex.patch_count) if patches is None else patches
+    points, normals = _placed_grid(complex, grading.cell_size, samples)
+    for first in range(0, len(patches), _PATCHES_AT_ONCE):
+        some = slice(first, first + _PATCHES_AT_ONCE)
+        placement, corner = complex.patch_placement[patches[some]], complex.patch_cell[patches[some]]
+        places = points[placement] + (corner * grading.cell_size)[:, np.newaxis]
+        yield some, grading.lay(places.reshape(-1, 3), normals[placement].reshape(-1, 3))
+
+
+def patch_points(complex: CellComplex, cell_size: float, samples: Floats) -> Floats:
+    """Points of every patch before any map, in mm; shape (patches, m * m, 3) for m samples along each side."""
+    return patch_points_and_normals(complex, cell_size, samples)[0]
+
+
+def patch_points_and_normals(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
+    """The same, and the unit normals on the common side, of the same shape."""
+    points, normals = _placed_grid(complex, cell_size, samples)
+    corners = (complex.patch_cell * cell_size)[:, np.newaxis]
+    return points[complex.patch_placement] + corners, normals[complex.patch_placement]
+
+
+def sampled_place(
+    complex: CellComplex, cell_size: float, samples: Floats, patch: int, index: int
+) -> tuple[float, float, float]:
+    """Where, in mm and before any map, the sample of a patch is that has a flat index in its grid."""
+    points, _ = _placed_grid(complex, cell_size, samples)
+    x, y, z = points[complex.patch_placement[patch], index] + complex.patch_cell[patch] * cell_size
+    return float(x), float(y), float(z)
+
+
+def _placed_grid(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
+    """Points in mm and unit normals of the first cell's patches; shape (placements, m * m, 3) each."""
+    placements = complex.placements
+    points, normals = _exact_grid(tuple(samples.tolist()), placements.patch.family)
+    turns = np.swapaxes(placements.matrices, 1, 2).astype(float)
+    places = points @ turns + (placements.translations * QUARTER)[:, np.newaxis]
+    return places * (cell_size / 2), normals @ (turns * placements.sides[:, np.newaxis, np.newaxis])
+
+
+@lru_cache(maxsize=16)
+def _exact_grid(samples: tuple[float, ...], family: Family) -> tuple[Floats, Floats]:
+    along = np.array(samples)
+    points, normals = PARAMETERISATIONS["smooth"](along[:, np.newaxis], along[np.newaxis], family)
+    return points.reshape(-1, 3), normals.reshape(-1, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class ExactMeasures:
+    """Of the exact wall.
+
+    Attributes
+    ----------
+    volume : float
+        In mm3.
+    area : float
+        Of the mid-surface, in mm2.
+    mean_thickness : float
+        Over the mid-surface, in mm.
+    """
+
+    volume: float
+    area: float
+    mean_thickness: float
+
+
+def exact_measures(complex: CellComplex, grading: Grading) -> ExactMeasures:
+    """Volume, area and mean thickness of the exact wall.
+
+    The exact faces are sampled at the Gauss points of each patch and differentiated as the polynomial
+    through them; patches are analytic, so this converges faster than any power. It is slower where a field has kinks.
+
+    Parameters
+    ----------
+    complex : CellComplex
+    grading : Grading
+
+    Returns
+    -------
+    ExactMeasures
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
+    rate = differentiation_matrix(nodes)
+    totals = np.zeros(3)
+    for _, laid in laid_patches(complex, grading, nodes):
+        shape = (-1, len(nodes), len(nodes), 3)
+        middle = laid.points.reshape(shape)
+        half = (laid.normals * (laid.thickness / 2)[:, np.newaxis]).reshape(shape)
+        middle_u, half_u = (np.einsum("ab,pbvc->pavc", rate, a) for a in (middle, half))
+        middle_v, half_v = (np.einsum("ab,pubc->puac", rate, a) for a in (middle, half))
+        # The integral over s from -1 to 1 of (M_u + s H_u) x (M_v + s H_v) . H.
+        flat = np.cross(middle_u, middle_v)
+        volumes = np.einsum("puvc,puvc->puv", 2 * flat + 2 / 3 * np.cross(half_u, half_v), half)
+        areas = np.linalg.norm(flat, axis=-1)
+        integrands = np.stack([volumes, areas, areas * laid.thickness.reshape(areas.shape)])
+        totals += np.einsum("u,v,ipuv->i", weights, weights, integrands)
+    volume, area, thickness = totals.tolist()
+    return ExactMeasures(volume, area, thickness / area)
+
+
+def block_volume(cells: tuple[int, int, int], grading: Grading) -> float:
+    """Volume in mm3 of the block of cells where the map carries it, by Gauss quadrature of the determinant.
+
+    Parameters
+    ----------
+    cells : tuple of int
+    grading : Grading
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    SoundnessError
+        If the determinant is not positive all over the block.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_BLOCK_POINTS)
+    inside = np.stack(np.meshgrid(*3 * [(nodes + 1) / 2], indexing="ij"), axis=-1).reshape(-1, 3)
+    quadrature = np.einsum("i,j,k->ijk", *3 * [weights / 2]).ravel()
+    volume = 0.0
+    for corner in np.ndindex(*cells):
+        determinant = grading.carry((inside + corner) * grading.cell_size)[2]
+        volume += float(np.sum(quadrature * determinant)) * grading.cell_size**3
+    return volume
+
+
+def differentiation_matrix(nodes: Floats) -> Floats:
+    """Derivatives at the nodes of the polynomial through values there, by barycentric weights.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (m,)
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+        From values at the nodes to derivatives there.
+    """
+    difference = nodes[:, np.newaxis] - nodes
+    np.fill_diagonal(difference, 1.0)
+    barycentric = 1 / difference.prod(axis=1)
+    matrix = barycentric / barycentric[:, np.newaxis] / difference
+    np.fill_diagonal(matrix, 0.0)
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    return np.asarray(matrix)
+
+
+def interpolation_matrix(nodes: Floats, places: Floats) -> Floats:
+    """Values at other places of the polynomial through values at the nodes (Lagrange's form).
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (m,)
+    places : ndarray, shape (k,)
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+    """
+    others = ~np.eye(len(nodes), dtype=bool)
+    denominators = np.prod(nodes[:, np.newaxis] - nodes, axis=1, where=others)
+    products = [np.prod(places[:, np.newaxis] - nodes[others[j]], axis=1) for j in range(len(nodes))]
+    return np.asarray(np.stack(products, axis=1) / denominators)

@@ -1,0 +1,239 @@
+"""What varies over a lattice: wall, cell size, and the space it is carried to.
+
+All fields are functions of the place in the lattice's own flat space, in mm, before any map. First the scale field
+s carries a point p to s(p) p, the paper's variable bounding-cell length; then the map of space carries on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import cross
+from gyroid_cad.errors import SoundnessError
+from gyroid_cad.fields.field import Field, evaluated, given_as
+from gyroid_cad.maps.space import OPEN, SpaceMap, carried, differences
+from gyroid_cad.surface.families import USUAL, MinimalSurface
+
+__all__ = ["THINNEST_WALL", "Grading", "Laid"]
+
+Floats = NDArray[np.float64]
+
+# Of differences, in cell sizes: their error, about its square, is far below any fit's; the rounding they amplify, which
+# neighbouring patches do not share, stays near 1e-12.
+_STEP = 2e-4
+# In mm. The kernel takes lengths under 1e-7 mm for nothing; this keeps every wall well above.
+THINNEST_WALL = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """The mid-surface where it is wanted.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        In mm.
+    normals : ndarray, shape (n, 3)
+        Unit normals of the mapped surface.
+    thickness : ndarray, shape (n,)
+        Whole wall in mm.
+    """
+
+    points: Floats
+    normals: Floats
+    thickness: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Grading:
+    """How the wall and the space vary.
+
+    Attributes
+    ----------
+    cell_size : float
+        Period of the lattice before any map, in mm.
+    thickness : float or Field, optional
+        Whole wall in mm.
+    density : float or Field, optional
+        Volume fraction instead of thickness.
+    scale_field : float or Field, optional
+        Factor on the position, without unit.
+    map : SpaceMap, optional
+    surface : MinimalSurface
+        Whose tube formula it goes by.
+    """
+
+    cell_size: float
+    thickness: float | Field | None = None
+    density: float | Field | None = None
+    scale_field: float | Field | None = None
+    map: SpaceMap | None = None
+    surface: MinimalSurface = USUAL
+
+    @property
+    def uniform(self) -> bool:
+        """Whether every cell is like every other: a constant wall in flat space."""
+        return not isinstance(self.thickness, Field | None) and self.scale_field is None and self.map is None
+
+    @property
+    def map_closes(self) -> tuple[bool, bool, bool]:
+        """Along which axes the map would join the ends of a block."""
+        return OPEN if self.map is None else self.map.closed
+
+    @property
+    def closed(self) -> tuple[bool, bool, bool]:
+        """Along which axes the block's ends are joined; a scale would part them again."""
+        return OPEN if self.scale_field is not None else self.map_closes
+
+    def lay(self, points: Floats, normals: Floats) -> Laid:
+        """Carry points of the mid-surface and their normals to where they are wanted.
+
+        Parameters
+        ----------
+        points, normals : ndarray, shape (n, 3)
+            In the lattice's own space; points in mm, unit normals.
+
+        Returns
+        -------
+        Laid
+
+        Raises
+        ------
+        ParameterError
+            If a field or the map gives something else than finite real numbers.
+        SoundnessError
+            If the map turns space inside out, or a thickness or density is outside its range.
+        """
+        images, jacobian, determinant = self.carry(points)
+        if jacobian is None:
+            return Laid(points, normals, self._thickness(points, 1.0))
+        turned = _turned(jacobian, np.ascontiguousarray(normals.T))
+        growth = np.sqrt(np.sum(turned * turned, axis=0))
+        return Laid(images.T, (turned / growth).T, self._thickness(points, determinant / growth))
+
+    def carry(self, points: Floats) -> tuple[Floats, Floats | None, Floats | float]:
+        """Images of points, and the Jacobian and its determinant there, component first.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+
+        Returns
+        -------
+        images : ndarray, shape (3, n)
+        jacobian : ndarray, shape (3, 3, n)
+            None in flat space.
+        determinant : ndarray, shape (n,)
+            1 in flat space.
+
+        Raises
+        ------
+        ParameterError
+        SoundnessError
+            If the determinant is not positive everywhere.
+        """
+        images = np.ascontiguousarray(points.T)
+        jacobian: Floats | None = None
+        determinant: Floats | float = 1.0
+        if self.scale_field is not None:
+            images, jacobian = self._scaled(images)
+            name = given_as("scale_field", self.scale_field)
+            determinant = _positive_determinant(name, jacobian, points)
+        if self.map is not None:
+            images, onward = carried("map", self.map, images, _STEP * self.cell_size)
+            determinant = determinant * _positive_determinant("map", onward, points)
+            jacobian = onward if jacobian is None else np.einsum("ijn,jkn->ikn", onward, jacobian)
+        return images, jacobian, determinant
+
+    def _scaled(self, places: Floats) -> tuple[Floats, Floats]:
+        """p -> s(p) p, whose Jacobian is s I + p (grad s)^T."""
+
+        name = given_as("scale_field", self.scale_field)
+
+        def scale(points: Floats) -> Floats:
+            return _values(name, self.scale_field, points.T)
+
+        factor, slope = scale(places), differences(scale, places, _STEP * self.cell_size)
+        _require(name, factor, places.T, 0.0, "above", "everywhere in the lattice")
+        jacobian = places[:, np.newaxis] * slope
+        for axis in range(3):
+            jacobian[axis, axis] += factor
+        return factor * places, jacobian
+
+    def asked(self, points: Floats) -> Floats:
+        """The thickness in mm, or the density, asked for at points of the lattice's own space; shape (n,).
+
+        Raises
+        ------
+        ParameterError
+        SoundnessError
+            If it is not positive everywhere, or a density past the largest.
+        """
+        value = self.thickness if self.density is None else self.density
+        parameter = given_as("thickness" if self.density is None else "density", value)
+        values = _values(parameter, value, points)
+        if self.density is None:
+            _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall", unit=" mm")
+            return values
+        _require(parameter, values, points, 0.0, "above", "everywhere in the lattice")
+        worst = int(np.argmax(values))
+        largest = self.surface.tube.largest_density
+        if values[worst] >= largest:
+            reason = "the density at which the wall meets itself"
+            raise SoundnessError(parameter, float(values[worst]), _place(points, worst), largest, reason)
+        return values
+
+    def _thickness(self, points: Floats, spacing: Floats | float) -> Floats:
+        asked = self.asked(points)
+        if self.density is None:
+            return asked
+        # The wall is stretched with the space across it, as if it had been mapped itself: so the volume
+        # fraction is kept, to first order in the thickness, however the map stretches.
+        thickness = np.asarray(self.surface.tube.thickness(asked) * self.cell_size * spacing)
+        _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall", "thickness", " mm")
+        return thickness
+
+
+def _values(parameter: str, value: float | Field | None, points: Floats) -> Floats:
+    if isinstance(value, Field):
+        return evaluated(parameter, value, points)
+    assert value is not None
+    return np.full(len(points), value)
+
+
+def _turned(jacobian: Floats, normals: Floats) -> Floats:
+    """Cofactors of the Jacobian times the normals, det(J) J^-T n: the area vector of the mapped surface."""
+    x, y, z = jacobian[:, 0], jacobian[:, 1], jacobian[:, 2]
+    return np.asarray(normals[0] * cross(y, z) + normals[1] * cross(z, x) + normals[2] * cross(x, y))
+
+
+def _positive_determinant(parameter: str, jacobian: Floats, points: Floats) -> Floats:
+    determinant = np.sum(jacobian[:, 0] * cross(jacobian[:, 1], jacobian[:, 2]), axis=0)
+    reason, quantity = "where space is turned inside out", "Jacobian determinant"
+    _require(parameter, determinant, points, 0.0, "above", reason, quantity)
+    return np.asarray(determinant)
+
+
+def _require(
+    parameter: str,
+    values: Floats,
+    points: Floats,
+    limit: float,
+    accepted: str,
+    reason: str,
+    quantity: str = "",
+    unit: str = "",
+) -> None:
+    """Refuse values that are not "above", or not "at least", a limit everywhere."""
+    worst = int(np.argmin(values))
+    if not (values[worst] > limit or (accepted == "at least" and values[worst] == limit)):
+        place = _place(points, worst)
+        raise SoundnessError(parameter, float(values[worst]), place, limit, reason, accepted, quantity, unit)
+
+
+def _place(points: Floats, index: int) -> tuple[float, float, float]:
+    x, y, z = points[index].tolist()
+    return x, y, z

@@ -1,0 +1,245 @@
+"""How large a sphere passes through a lattice's channels, from the exact surface by distance.
+
+A labyrinth's throats are where the largest sphere that can travel through it without end is held: the places with the
+greatest least distance from the mid-surface along a path (the pore-limiting diameter of porous media). A wall's face
+lies half the wall off the mid-surface along its normals, so the sphere's diameter falls by exactly the wall's
+thickness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.nurbs.surface import grid_points
+from gyroid_cad.surface.families import MinimalSurface
+from gyroid_cad.surface.patch import smooth
+from gyroid_cad.surface.symmetry import CELL_QUARTERS
+from gyroid_cad.wall.covering import AT_HOME, covering_complex
+from gyroid_cad.wall.exact import patch_points_and_normals
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.offset import SIDES, Wall
+
+__all__ = ["Throats", "labyrinth_throats", "narrowest_opening", "throat_diameter"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+# Nodes along a cell. Throats lie where symmetries of the surface leave points fixed, which are eighths of the cell; and
+# the channels of all three surfaces run along edges and diagonals of the grid, along which its nodes are joined.
+_NODES = 16
+# Samples along a patch's side: of the mid-surface, and of the faces of a wall that varies.
+_EXACT_SAMPLES, _FACE_SAMPLES = 25, 9
+# Nodes whose distances agree so closely, in cell sizes, lie equally far: symmetric ones do, to rounding.
+_EQUALLY_FAR = 1e-9
+# The nearest place is sought in ever smaller grids round the best one, down to a reach whose square is rounding.
+_CLOSER_SAMPLES, _CLOSEST, _NO_NEARER = 17, 1e-8, 1e-14
+# Distances to samples that may yet turn out the least, as a part of the least; and how many are looked at closely.
+_MAY_BE_LEAST, _LOOKED_AT = 1.05, 64
+_PATCHES_AT_ONCE = 4_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Throats:
+    """The throats of a surface's two labyrinths.
+
+    Attributes
+    ----------
+    centres : ndarray, shape (n, 3)
+        Of one cell, in cell sizes, within [0, 1).
+    above : ndarray of bool, shape (n,)
+        Whether they lie in the labyrinth that the common normal points to.
+    radius : float
+        Distance from the mid-surface, in cell sizes: the less of the two labyrinths'.
+    """
+
+    centres: Floats
+    above: Booleans
+    radius: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+def throat_diameter(surface: MinimalSurface, cell_size: float, thickness: float) -> float:
+    """Diameter of the largest sphere that can pass through both labyrinths beside a constant wall, in mm.
+
+    Parameters
+    ----------
+    surface : MinimalSurface
+    cell_size, thickness : float
+        In mm.
+    """
+    return 2 * labyrinth_throats(surface).radius * cell_size - thickness
+
+
+@lru_cache(maxsize=8)
+def labyrinth_throats(surface: MinimalSurface) -> Throats:
+    """Where a surface's labyrinths are narrowest for what travels through them.
+
+    A grid is flooded from the places furthest from the surface until the flood runs through the cell without end; the
+    node that joins it is the throat, and its distance is then worked out to rounding from the exact surface.
+
+    Parameters
+    ----------
+    surface : MinimalSurface
+    """
+    from scipy.spatial import cKDTree
+
+    complex = covering_complex(np.full(3, -0.5), np.full(3, 1.5), AT_HOME, 1.0, 0.0, surface)
+    samples = np.linspace(-1, 1, _EXACT_SAMPLES)
+    places, normals = (part.reshape(-1, 3) for part in patch_points_and_normals(complex, 1.0, samples))
+    nodes = np.stack(np.meshgrid(*3 * [np.arange(_NODES) / _NODES], indexing="ij"), axis=-1).reshape(-1, 3)
+    found = cKDTree(places).query(nodes)
+    distance, nearest = np.asarray(found[0]), np.asarray(found[1])
+    above = np.sum((nodes - places[nearest]) * normals[nearest], axis=1) > 0
+
+    def exact(u: Floats, v: Floats) -> Floats:
+        return smooth(u[:, np.newaxis], v[np.newaxis], surface.family)[0]
+
+    chosen, radii = [], []
+    for side in (True, False):
+        held = _held(np.where(above == side, distance, 0.0).reshape(3 * [_NODES]))
+        at = np.flatnonzero((above == side) & (np.abs(distance - held) < _EQUALLY_FAR))
+        chosen.append(at)
+        patch = int(nearest[at[0]]) // _EXACT_SAMPLES**2
+        turn = complex.placements.matrices[complex.patch_placement[patch]]
+        middle = complex.placements.translations[complex.patch_placement[patch]] / CELL_QUARTERS
+        # In the patch's own frame, whose unit is half a cell.
+        own = 2 * (nodes[at[0]] - middle - complex.patch_cell[patch]) @ turn
+        radii.append(_least_distance(exact, own) / 2)
+    every = np.concatenate(chosen)
+    return Throats(nodes[every], above[every], min(radii))
+
+
+def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int]) -> float:
+    """Diameter of the largest sphere about the throats' centres of a lattice that varies, in mm.
+
+    The centres are carried along with space. Where a wall or a map is lopsided a sphere somewhat larger passes beside
+    the centre: so this is on the safe side. Distances are measured to the nets' own faces.
+
+    Parameters
+    ----------
+    wall : Wall
+    grading : Grading
+    cells : tuple of int
+
+    Returns
+    -------
+    float
+    """
+    centres = _throats_of_block(labyrinth_throats(grading.surface).centres, cells) * grading.cell_size
+    images = grading.carry(centres)[0].T
+    distance, patch = _to_faces(wall, images)
+    least = float(distance.min())
+    near = np.argsort(distance)[:_LOOKED_AT]
+    for throat in near[distance[near] <= _MAY_BE_LEAST * least].tolist():
+        # The nearest place may lie just across an edge of the patch with the nearest sample.
+        beside = wall.complex.edge_patches[wall.complex.patch_edges[patch[throat]]]
+        for other in np.unique(beside[beside >= 0]).tolist():
+            point = images[throat] - wall.shifts[wall.patch_shift[other]]
+            least = min(least, *(_from_face(wall, int(wall.patch_net[other]), side, point) for side in SIDES))
+    return 2 * least
+
+
+def _from_face(wall: Wall, net: int, side: int, point: Floats) -> float:
+    def places(u: Floats, v: Floats) -> Floats:
+        return grid_points(wall.nets[net, side], wall.weights, (wall.knots, wall.knots), u, v)
+
+    return _least_distance(places, point)
+
+
+def _throats_of_block(centres: Floats, cells: tuple[int, int, int]) -> Floats:
+    """Throats of all cells of a block and of its far sides; shape (n, 3)."""
+    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells), indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    every = (grid + centres).reshape(-1, 3)
+    return np.asarray(every[np.all(every <= np.array(cells), axis=1)])
+
+
+def _to_faces(wall: Wall, points: Floats) -> tuple[Floats, Integers]:
+    """Distances of points from samples of all faces, and to which patches the nearest ones belong."""
+    from scipy.spatial import cKDTree
+
+    samples, knots = np.linspace(-1, 1, _FACE_SAMPLES), (wall.knots, wall.knots)
+    distance, patch = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
+    for first in range(0, wall.complex.patch_count, _PATCHES_AT_ONCE):
+        some = slice(first, first + _PATCHES_AT_ONCE)
+        places = grid_points(wall.nets[wall.patch_net[some]], wall.weights, knots, samples, samples)
+        places = places.reshape(len(places), -1, 3) + wall.shifts[wall.patch_shift[some]][:, np.newaxis]
+        found = cKDTree(places.reshape(-1, 3)).query(points)
+        nearer = np.asarray(found[0]) < distance
+        distance[nearer] = np.asarray(found[0])[nearer]
+        patch[nearer] = first + np.asarray(found[1])[nearer] // places.shape[1]
+    return distance, patch
+
+
+def _least_distance(places: Callable[[Floats, Floats], Floats], point: Floats) -> float:
+    """Distance of a point from a surface on [-1, 1]^2, by ever smaller grids round the nearest place."""
+    u = v = 0.0
+    reach, least = 1.0, np.inf
+    while reach > _CLOSEST:
+        along = np.linspace(-reach, reach, _CLOSER_SAMPLES)
+        us, vs = np.clip(u + along, -1, 1), np.clip(v + along, -1, 1)
+        distance = np.linalg.norm(places(us, vs) - point, axis=-1)
+        i, j = np.unravel_index(int(np.argmin(distance)), distance.shape)
+        nearer = float(distance[i, j]) < least * (1 - _NO_NEARER)
+        u, v, least = float(us[i]), float(vs[j]), min(least, float(distance[i, j]))
+        # At the grid's rim there may be nearer places beyond.
+        at_rim = not {0, _CLOSER_SAMPLES - 1}.isdisjoint((i, j))
+        reach *= 1.0 if at_rim and nearer and reach < 1 else 3 / _CLOSER_SAMPLES
+    return least
+
+
+def _held(distance: Floats) -> float:
+    """The greatest value at which the nodes of a periodic grid that have it run through the grid without end."""
+    values = np.unique(distance[distance > 0])
+    low, high = 0, len(values)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _endless(distance >= values[middle] - _EQUALLY_FAR):
+            low = middle
+        else:
+            high = middle
+    return float(values[low])
+
+
+def _endless(filled: Booleans) -> bool:
+    """Whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images elsewhere."""
+    from scipy import ndimage
+
+    labels = ndimage.label(filled, np.ones((3, 3, 3)))[0]
+    links: dict[int, set[tuple[int, int, int, int]]] = {}
+    wrapped = np.pad(labels, 1, mode="wrap")
+    for step in np.ndindex(3, 3, 3):
+        window = tuple(slice(offset, offset + size) for offset, size in zip(step, labels.shape, strict=True))
+        beyond = _cells_beyond(labels.shape, step)
+        crossing = (labels > 0) & (wrapped[window] > 0) & np.any(beyond != 0, axis=-1)
+        pairs = np.column_stack([labels[crossing], wrapped[window][crossing], beyond[crossing]])
+        for one, other, x, y, z in np.unique(pairs, axis=0).tolist():
+            links.setdefault(one, set()).add((other, x, y, z))
+    where: dict[int, tuple[int, int, int]] = {}
+    for first in links:
+        waiting = [] if first in where else [first]
+        where.setdefault(first, (0, 0, 0))
+        while waiting:
+            here = waiting.pop()
+            for other, *step_to in links[here]:
+                x, y, z = (a + b for a, b in zip(where[here], step_to, strict=True))
+                if other not in where:
+                    where[other] = x, y, z
+                    waiting.append(other)
+                elif where[other] != (x, y, z):
+                    return True
+    return False
+
+
+def _cells_beyond(shape: tuple[int, ...], step: tuple[int, ...]) -> Integers:
+    """In which cell, from -1 to 1 along each axis, the node lies that a step (0 to 2, less 1) leads to."""
+    axes = [np.floor_divide(np.arange(size) + offset - 1, size) for size, offset in zip(shape, step, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

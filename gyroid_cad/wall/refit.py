@@ -1,0 +1,238 @@
+"""The wall of a lattice that varies: every patch fitted anew, all at once, by one linear operator.
+
+On a grid of samples with the square's border in it, the staged fit of :mod:`gyroid_cad.surface.fit` (corners, then
+edges from their own samples, then the interior) is one small matrix applied along u and then along v. So all
+patches take two matrix products, and an edge's control points still depend on nothing but the edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot
+from gyroid_cad.errors import FitError, ParameterError
+from gyroid_cad.nurbs.surface import basis, edge_row, grid_derivatives, uniform_knots
+from gyroid_cad.surface.fit_settings import DEGREE, MOST_CONTROL_POINTS, more_control_points
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.exact import laid_patches
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["Refit", "fitted_nets", "fitted_wall", "likely_control_points", "measured"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# The wall may be off by so many times the tolerance, relative to itself.
+WALL_PER_TOLERANCE = 5.0
+_CHECKS_PER_SPAN = 2
+_TRIED_PATCHES = 32
+_LARGEST_EXCESS_TRUSTED = 16.0
+# How far control points of one edge may differ between its two patches, in cell sizes: rounding, amplified by
+# differences where a map has no Jacobian, leaves 1e-12.
+_EDGE_GAP_LIMIT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Refit:
+    """What the fit of a wall that varies is worth.
+
+    Attributes
+    ----------
+    control_points : int
+        Along each side of every patch.
+    max_deviation : float
+        In mm, of both faces from the exact ones, along their normals.
+    max_wall_error : float
+        Relative, of the distance between the faces along the exact normal.
+    max_normal_angle : float
+        In degrees, between the normals of the fitted and of the exact mid-surface.
+    thinnest, thickest : float
+        Wall asked for, in mm.
+    samples : int
+        Along each side of a patch, at which all this was measured.
+    """
+
+    control_points: int
+    max_deviation: float
+    max_wall_error: float
+    max_normal_angle: float
+    thinnest: float
+    thickest: float
+    samples: int
+
+    def excess(self, tolerance: float, cell_size: float) -> float:
+        """How many times as far off the fit is as it may be."""
+        return max(self.max_deviation / (tolerance * cell_size), self.max_wall_error / (WALL_PER_TOLERANCE * tolerance))
+
+    def control_points_for(self, tolerance: float, cell_size: float) -> int:
+        """How many control points to fit with next; as many as now if the fit is as close as asked for.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest deviation of either face, in cell sizes.
+        cell_size : float
+            In mm.
+
+        Raises
+        ------
+        ParameterError
+            If the tolerance is out of reach.
+        """
+        reached = self.max_deviation / cell_size
+        excess = self.excess(tolerance, cell_size)
+        if excess <= 1:
+            return self.control_points
+        if self.control_points == MOST_CONTROL_POINTS:
+            raise ParameterError(
+                "tolerance",
+                tolerance,
+                f"at least {tolerance * excess:.2g}: {MOST_CONTROL_POINTS} control points a side are {reached:.2g} of "
+                f"the cell size off, and the wall {self.max_wall_error:.2g} of itself, which counts as a "
+                f"{WALL_PER_TOLERANCE:g}th; is a field or the map not smooth?",
+            )
+        return more_control_points(self.control_points, excess)
+
+
+def likely_control_points(complex: CellComplex, grading: Grading, least: int, tolerance: float) -> int:
+    """How many control points the tolerance is likely to take, from a fit of a few patches.
+
+    Parameters
+    ----------
+    complex : CellComplex
+    grading : Grading
+    least : int
+        Control points to fit those with, and the least to answer.
+    tolerance : float
+        In cell sizes.
+    """
+    few = np.unique(np.linspace(0, complex.patch_count - 1, _TRIED_PATCHES).astype(np.int64))
+    made = measured(fitted_nets(complex, grading, least, few), complex, grading, few)
+    # A wall that folds is off by any amount; whether it does is not for this to say.
+    excess = min(made.excess(tolerance, grading.cell_size), _LARGEST_EXCESS_TRUSTED)
+    return least if excess <= 1 else more_control_points(least, excess)
+
+
+def fitted_wall(complex: CellComplex, grading: Grading, control_points: int) -> Wall:
+    """Fit every patch's two faces with so many control points a side.
+
+    Raises
+    ------
+    ParameterError
+        If a field or the map is no good somewhere.
+    FitError
+        If neighbouring patches do not meet, because a field or the map is not continuous.
+    """
+    patches = np.arange(complex.patch_count)
+    wall = Wall(
+        complex=complex,
+        nets=fitted_nets(complex, grading, control_points, patches),
+        patch_net=patches,
+        shifts=np.zeros((1, 3)),
+        patch_shift=np.zeros_like(patches),
+        weights=np.ones((control_points, control_points)),
+        knots=uniform_knots(control_points),
+    )
+    _require_shared_edges(wall, grading.cell_size)
+    return wall
+
+
+def fitted_nets(complex: CellComplex, grading: Grading, control_points: int, patches: Integers) -> Floats:
+    """Control points of the two faces of some patches; shape (patches, 2, n, n, 3)."""
+    samples, operator = _fit_operator(control_points)
+    nets = np.empty((len(patches), 2, control_points, control_points, 3))
+    for some, laid in laid_patches(complex, grading, samples, patches):
+        offset = laid.normals * (laid.thickness / 2)[:, np.newaxis]
+        faces = np.concatenate([laid.points - offset, laid.points + offset], axis=1)
+        along_u = operator @ faces.reshape(-1, len(samples), len(samples) * 6)
+        net = operator @ along_u.reshape(-1, control_points, len(samples), 6)
+        nets[some] = np.moveaxis(net.reshape(*net.shape[:-1], 2, 3), -2, 1)
+    return nets
+
+
+def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Integers | None = None) -> Refit:
+    """Measure fitted patches against the exact wall, twice a span and at the ends.
+
+    Parameters
+    ----------
+    nets : ndarray, shape (patches, 2, n, n, 3)
+    complex : CellComplex
+    grading : Grading
+    patches : ndarray of int, optional
+        Which patches the nets are of; all if left out.
+
+    Returns
+    -------
+    Refit
+    """
+    n = nets.shape[2]
+    knots, weights = (uniform_knots(n),) * 2, np.ones((n, n))
+    samples = np.linspace(-1, 1, _CHECKS_PER_SPAN * (n - DEGREE) + 1)
+    worst = np.zeros(3)
+    thinnest, thickest = np.inf, 0.0
+    for some, laid in laid_patches(complex, grading, samples, patches):
+        points, du, dv = grid_derivatives(nets[some], weights, knots, samples, samples)
+        shape = (len(points), len(samples), len(samples))
+        thickness, normal = laid.thickness.reshape(shape), laid.normals.reshape(*shape, 3)
+        half = (thickness / 2)[..., np.newaxis] * normal
+        off = points - laid.points.reshape(*shape, 3)[:, np.newaxis] - np.stack([-half, half], axis=1)
+        # The fitted faces' own normals: how far off they are, and how far along the exact normal they are met.
+        outwards = _unit(np.cross(du, dv))
+        distance = dot(off, outwards)
+        met = distance / dot(outwards, normal[:, np.newaxis])
+        middle = _unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
+        sine = np.linalg.norm(np.cross(middle, normal), axis=-1)
+        worst = np.maximum(worst, [_largest(distance), _largest((met[:, 1] - met[:, 0]) / thickness), _largest(sine)])
+        thinnest, thickest = min(thinnest, float(thickness.min())), max(thickest, float(thickness.max()))
+    angle = float(np.degrees(np.arcsin(min(worst[2], 1.0))))
+    return Refit(n, float(worst[0]), float(worst[1]), angle, thinnest, thickest, len(samples))
+
+
+@lru_cache(maxsize=16)
+def _fit_operator(control_points: int) -> tuple[Floats, Floats]:
+    """Samples on [-1, 1], ends included, and the matrix from values there to the control points of a curve.
+
+    The ends are interpolated, the rest are least squares (eqs. (12), (13)) over evenly spaced samples, two more than
+    there are control points between the ends: as close as over twice as many Gauss points.
+    """
+    knots = uniform_knots(control_points)
+    inner = (np.arange(control_points) + 0.5) / control_points * 2 - 1
+    functions = basis(knots, DEGREE, inner)
+    solve = np.linalg.pinv(functions[:, 1:-1])
+    ends = -solve @ functions[:, [0, -1]]
+    operator = np.zeros((control_points, control_points + 2))
+    operator[0, 0] = operator[-1, -1] = 1.0
+    operator[1:-1] = np.column_stack([ends[:, 0], solve, ends[:, 1]])
+    return np.concatenate([[-1.0], inner, [1.0]]), operator
+
+
+def _require_shared_edges(wall: Wall, cell_size: float) -> None:
+    """Compare the control points that two patches have for their common edge."""
+    complex = wall.complex
+    rows = np.stack([edge_row(np.moveaxis(wall.nets, (2, 3), (0, 1)), k) for k in range(4)])
+    rows = np.where(complex.edge_forward.T[:, np.newaxis, :, np.newaxis, np.newaxis], rows, rows[:, ::-1])
+    patch, k = np.divmod(np.argsort(complex.patch_edges.ravel(), kind="stable"), 4)
+    order = complex.patch_edges[patch, k]
+    pair = np.flatnonzero(order[1:] == order[:-1])
+    gaps = np.abs(rows[k[pair], :, patch[pair]] - rows[k[pair + 1], :, patch[pair + 1]]).max(axis=(1, 2, 3))
+    worst = int(np.argmax(gaps)) if len(gaps) else 0
+    if len(gaps) and gaps[worst] > _EDGE_GAP_LIMIT * cell_size:
+        middle = wall.nets[patch[pair[worst]]].mean(axis=(0, 1, 2))
+        place = ", ".join(f"{p:.6g}" for p in middle)
+        raise FitError(
+            f"the edges of neighbouring patches are {gaps[worst]:.2g} mm apart near ({place}) mm of the part: "
+            "thickness, density, scale_field and map must be continuous, and the same at both ends that a map joins"
+        )
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _largest(values: Floats) -> float:
+    return float(np.max(np.abs(values)))

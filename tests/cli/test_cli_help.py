@@ -1,0 +1,175 @@
+"""Help: every command has examples, and every example works. Completion: shells are told what may follow."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import cadquery
+import click
+import pytest
+
+from gyroid_cad.cli.app import commands, main
+from gyroid_cad.lattice import Lattice
+from gyroid_cad.surface.fit import FitSettings
+
+Captured = pytest.CaptureFixture[str]
+
+# So that each runs in a moment: fewer cells, fewer control points, larger triangles. What is left is as it is printed.
+_CELLS = re.compile(r"--cells \d+ \d+ \d+")
+_QUICK_FIT = ["--control-points", "5"]
+
+
+def examples() -> Iterator[tuple[str, str]]:
+    for name, command in {"": commands, **commands.commands}.items():
+        for line in (command.help or "").splitlines():
+            if line.strip().startswith("gyroid-cad"):
+                yield name, line.strip()
+
+
+EXAMPLES = list(examples())
+
+
+def words(line: str) -> list[str]:
+    """The arguments of an example, without what the shell makes of the rest."""
+    program, *arguments = shlex.split(re.split(r" >>? ", line)[0])
+    assert program == "gyroid-cad"
+    return arguments
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that the examples read."""
+    folder = tmp_path_factory.mktemp("parts")
+    cadquery.exporters.export(cadquery.Workplane().box(5, 6, 7), str(folder / "part.step"))
+    lattice = Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(5))
+    lattice.write(folder / "part.stl", folder / "part.3mf", deviation=0.2)
+    (folder / "lattice.toml").write_text("cells = [1, 1, 1]\ncell_size = 10\nthickness = 0.8\ncontrol_points = 5\n")
+    return folder
+
+
+@pytest.fixture
+def folder(parts: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One to stand in, with those files."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(parts, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+def test_every_command_has_examples_of_its_own() -> None:
+    assert {name for name, _ in EXAMPLES} == {"", *commands.commands}
+    for name, line in EXAMPLES:
+        assert not name or words(line)[0] == name
+
+
+@pytest.mark.parametrize(("name", "line"), EXAMPLES, ids=[line[11:60] for _, line in EXAMPLES])
+@pytest.mark.usefixtures("folder")
+def test_every_example_is_understood_as_it_is_printed(name: str, line: str) -> None:
+    command, *arguments = words(line)
+    with commands.commands[command].make_context(command, arguments) as context:
+        assert context.params
+        if context.params.get("cells") is not None:
+            from gyroid_cad.cli.lattice_options import lattice_of
+
+            # Described and validated: what cannot be built in principle is refused here.
+            assert lattice_of(context.params).cells == context.params["cells"]
+
+
+# The ring, which fewer cells cannot make, is run among the README's commands.
+RUN = [(name, line) for name, line in EXAMPLES if "--map" not in line]
+
+
+@pytest.mark.parametrize(("name", "line"), RUN, ids=[line[11:60] for _, line in RUN])
+def test_every_example_runs_with_fewer_cells(name: str, line: str, folder: Path, capsys: Captured) -> None:
+    quick = re.sub(r"--subdivisions \d+", "--subdivisions 3", _CELLS.sub("--cells 1 1 1", line))
+    arguments = words(re.sub(r"--deviation \S+", "--deviation 0.2", quick))
+    if name == "view" and "--screenshot" not in arguments:
+        # Nobody is there to close a window.
+        arguments += ["--screenshot", "view.png"]
+    takes_a_fit = any(option.name == "control_points" for option in commands.commands[arguments[0]].params)
+    of_a_file = name in ("view", "print-check", "report") and not arguments[1].startswith("-")
+    if takes_a_fit and not of_a_file and "--control-points" not in arguments:
+        arguments += _QUICK_FIT
+    if "*" in line:
+        arguments += ["--tolerance", "1e-2"]
+    status = main(arguments)
+    out, err = capsys.readouterr()
+    if name == "view" and status:
+        pytest.skip(f"nothing can be drawn off-screen here: {err}")
+    assert (status, err) == (0, ""), err
+    assert out or name == "view"
+    for output in [after for before, after in pairwise(arguments) if before == "-o"]:
+        assert (folder / output).stat().st_size > 0
+
+
+def test_help_shows_each_example_whole_on_its_line(capsys: Captured) -> None:
+    for name, line in EXAMPLES:
+        assert main([name, "--help"] if name else ["--help"]) == 0
+        assert line in [shown.strip() for shown in capsys.readouterr().out.splitlines()]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_is_clicks_own_for_this_program(shell: str, capsys: Captured) -> None:
+    assert main(["completion", shell]) == 0
+    out, err = capsys.readouterr()
+    assert f"_GYROID_CAD_COMPLETE={shell}_complete" in out
+    assert "gyroid-cad" in out
+    assert err == ""
+    program = shutil.which(shell)
+    if program is not None:
+        # The shell itself finds nothing wrong with it.
+        subprocess.run([program, "-n"], input=out, text=True, check=True)
+
+
+def completed(monkeypatch: pytest.MonkeyPatch, captured: Captured, line: str) -> list[str]:
+    monkeypatch.setenv("_GYROID_CAD_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(line.split(" ")) - 1))
+    captured.readouterr()
+    assert main([]) == 0
+    return [shown.partition(",")[2] for shown in captured.readouterr().out.splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("gyroid-cad comp", ["completion"]),
+        ("gyroid-cad build --surface d", ["diamond"]),
+        ("gyroid-cad build --thickn", ["--thickness", "--thickness-factor"]),
+        ("gyroid-cad completion ", ["bash", "zsh", "fish"]),
+    ],
+)
+def test_a_shell_that_asks_is_told_what_may_follow(
+    line: str, expected: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    assert completed(monkeypatch, capsys, line) == expected
+
+
+def test_in_bash_itself_the_tab_key_completes_a_command(tmp_path: Path) -> None:
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("no bash")
+    program = tmp_path / "gyroid-cad"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m gyroid_cad "$@"\n')
+    program.chmod(0o755)
+    script = (
+        f'PATH="{tmp_path}:$PATH"; eval "$(gyroid-cad completion bash)"\n'
+        'COMP_WORDS=(gyroid-cad vol); COMP_CWORD=1; _gyroid_cad_completion gyroid-cad; echo "${COMPREPLY[@]}"\n'
+    )
+    done = subprocess.run([bash, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "volumes\n", done.stderr
+
+
+def test_commands_are_clicks_and_each_explains_itself() -> None:
+    for command in commands.commands.values():
+        assert isinstance(command, click.Command)
+        assert command.help
+        for option in command.params:
+            if isinstance(option, click.Option):
+                assert option.help, f"{command.name} {option.name}"

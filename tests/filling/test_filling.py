@@ -1,0 +1,325 @@
+"""Parts filled with gyroid: the wall, the labyrinths, what they weigh, and what is refused."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import build123d as bd
+import cadquery as cq
+import numpy as np
+import pytest
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopoDS import TopoDS_Shape
+from scipy.spatial.transform import Rotation
+
+import gyroid_cad.kernel.regions
+import gyroid_cad.kernel.split
+from gyroid_cad.errors import ExportError, KernelError, ParameterError
+from gyroid_cad.filling.fill import Filled, _turn, fill, part_of
+from gyroid_cad.filling.part import Filling
+from gyroid_cad.filling.wanted import KINDS
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.part import measure
+from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.lattice import Lattice
+from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import FitSettings
+
+TUBE = USUAL.tube
+
+CELL, WALL, RADIUS = 10.0, 0.9, 2.2
+BALL = 4 / 3 * np.pi * RADIUS**3
+COARSE = FitSettings(6)
+
+
+def ball(x: float = 5.0) -> cq.Workplane:
+    return cq.Workplane(origin=(x, 4.0, 6.0)).sphere(RADIUS)
+
+
+@lru_cache(maxsize=8)
+def filled(kind: str = "sheet", density: float | None = None) -> Filled:
+    wall = WALL if density is None else None
+    return fill(ball(), CELL, wall, density, kind, rotation=(10, 20, 30), fit=COARSE, material_density=2.7)
+
+
+@pytest.mark.parametrize(
+    ("kind", "density"), [("sheet", None), ("network-a", 0.4), ("network-b", 0.65), ("channels", None)]
+)
+def test_a_filled_part_is_closed_valid_and_what_its_report_says(kind: str, density: float | None) -> None:
+    made, report = filled(kind, density), filled(kind, density).report
+    assert is_valid(made.solid())
+    assert topology(made.solid()).closed
+    assert (topology(made.solid()).solids, topology(made.solid()).faces) == (report.solids, report.faces)
+    assert measure(made.solid()) == pytest.approx((report.volume, report.area), rel=1e-8)
+    assert report.part_volume == pytest.approx(BALL, rel=1e-6)
+    assert report.density == pytest.approx(report.volume / report.part_volume)
+    assert report.mass == pytest.approx(2.7e-3 * report.volume)
+    assert report.part_mass == pytest.approx(2.7e-3 * report.part_volume)
+
+
+def test_the_wall_and_the_channels_it_leaves_are_the_whole_part() -> None:
+    assert filled("sheet").report.volume + filled("channels").report.volume == pytest.approx(BALL, rel=1e-5)
+    assert set(filled("channels").domains) == {"channel-a", "channel-b"}
+
+
+def test_the_labyrinths_of_complementary_densities_are_the_whole_part() -> None:
+    # Where one begins at an offset, the other, of one less its density, ends.
+    both = [
+        fill(ball(), CELL, None, density, kind, fit=COARSE)
+        for kind, density in (("network-a", 0.3), ("network-b", 0.7))
+    ]
+    assert sum(made.report.volume for made in both) == pytest.approx(BALL, rel=1e-5)
+
+
+@pytest.mark.parametrize("density", [0.1, 0.3, 0.5, 0.7])
+def test_a_labyrinth_begins_where_half_of_space_less_half_a_wall_is_left(density: float) -> None:
+    offset = TUBE.network_offset(density)
+    assert 0.5 - np.sign(offset) * TUBE.density(2 * abs(offset)) / 2 == pytest.approx(density, rel=1e-12)
+
+
+def test_a_box_of_one_period_is_as_dense_as_was_asked() -> None:
+    made = fill(cq.Workplane().box(CELL, CELL, CELL).translate((1, 2, 3)), CELL, density=0.25, origin=(0.3, 0.2, 0.1))
+    assert made.report.density == pytest.approx(0.25, rel=1e-4)
+    assert made.report.thickness == pytest.approx(TUBE.thickness(0.25) * CELL)
+
+
+def test_moving_part_and_lattice_together_changes_nothing() -> None:
+    angles, shift = (30.0, -40.0, 50.0), (3.0, -2.0, 1.0)
+    moved = ball().val().moved(cq.Location(cq.Vector(*shift)) * cq.Location((0, 0, 0), (0, 0, 1), 0))
+    before, after = fill(ball(), CELL, WALL, fit=COARSE), fill(moved, CELL, WALL, origin=shift, fit=COARSE)
+    assert after.report.volume == pytest.approx(before.report.volume, rel=1e-7)
+    assert after.report.faces == before.report.faces
+    np.testing.assert_allclose(
+        _turn(np.array(angles)), Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), atol=1e-15
+    )
+
+
+def test_parts_of_any_host_and_of_files_are_the_same_part(tmp_path: Path) -> None:
+    shape, file = ball().val(), tmp_path / "ball.step"
+    write_step(shape.wrapped, file)
+    parts: list[Any] = [ball(), shape, shape.wrapped, bd.Solid(shape.wrapped), file, str(file)]
+    assert [part_of(part).volume for part in parts] == pytest.approx(len(parts) * [BALL], rel=1e-6)
+
+
+def test_islands_are_counted_and_dropped_on_request() -> None:
+    two = ball().add(ball(5.0 + 3 * RADIUS))
+    both, one = (fill(two, CELL, WALL, fit=COARSE, drop_islands=drop).report for drop in (False, True))
+    assert (both.islands, both.dropped) == (both.solids - 1, 0)
+    assert both.islands >= 1
+    assert (one.islands, one.dropped, one.solids) == (0, both.islands, 1)
+    assert one.volume < both.volume
+
+
+def test_a_box_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    box = cq.Workplane().box(4, 5, 3).translate((5, 4, 6))
+    sections = fill(box, CELL, WALL, fit=COARSE).report
+    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill: self._by_booleans(infill))
+    booleans = fill(box, CELL, WALL, fit=COARSE).report
+    assert sections.by_sections
+    assert sections.volume == pytest.approx(booleans.volume, rel=1e-5)
+    assert sections.area == pytest.approx(booleans.area, rel=1e-5)
+    assert (sections.solids, sections.faces) == (booleans.solids, booleans.faces)
+
+
+@pytest.mark.parametrize("side", [1.0, 2.0, 4.0])
+def test_small_boxes_at_the_origin_are_cut_as_large_ones_are(side: float) -> None:
+    box = cq.Workplane().box(side, side, side, centered=False)
+    both = [fill(box, 7.0, 0.6, kind=kind, fit=COARSE).report for kind in ("sheet", "channels")]
+    assert all(report.by_sections for report in both)
+    assert sum(report.volume for report in both) == pytest.approx(side**3, rel=1e-6)
+
+
+def test_a_box_that_cannot_be_cut_by_sections_goes_to_the_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(self: Filling, infill: Any) -> Any:
+        raise KernelError("touches")
+
+    monkeypatch.setattr(Filling, "_by_sections", failing)
+    report = fill(cq.Workplane().box(4, 5, 3).translate((5, 4, 6)), CELL, WALL, fit=COARSE).report
+    assert not report.by_sections
+    assert report.valid
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (20, 30, 40)])
+def test_the_wall_in_a_box_and_its_channels_are_the_whole_box_however_the_lattice_is_turned(turn: Any) -> None:
+    box = cq.Workplane().box(6, 7, 8)
+    both = [fill(box, CELL, WALL, kind=kind, rotation=turn, fit=COARSE).report for kind in ("sheet", "channels")]
+    assert sum(report.volume for report in both) == pytest.approx(6 * 7 * 8, rel=1e-6)
+
+
+def test_whole_cells_are_as_dense_as_was_asked_wherever_they_begin() -> None:
+    box = cq.Workplane().box(2 * CELL, CELL, CELL)
+    for origin in ((0, 0, 0), (1.1, 2.3, 4.7)):
+        assert fill(box, CELL, density=0.3, origin=origin).report.density == pytest.approx(0.3, rel=1e-6)
+
+
+# No corner of the lattice lies in a side of the box: the lattice would be shifted, and the surface another.
+@pytest.mark.parametrize("part", [ball(), cq.Workplane().box(4, 5, 3).translate((5.3, 4.2, 6.1))], ids=["ball", "box"])
+def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: cq.Workplane, tmp_path: Path) -> None:
+    surface, wall = fill(part, CELL, kind="surface", fit=COARSE), fill(part, CELL, 0.05, fit=COARSE)
+    report = surface.report
+    assert (report.volume, report.solids, report.smallest_wall, report.closed) == (0, 0, None, False)
+    # A thin wall is its mid-surface times its thickness.
+    assert report.area == pytest.approx(wall.report.volume / 0.05, rel=1e-3)
+    surface.write(tmp_path / "surface.step")
+    assert is_valid(read_step(tmp_path / "surface.step"))
+    with pytest.raises(ParameterError, match="the bare surface bounds no volume"):
+        surface.write(tmp_path / "surface.stl")
+    with pytest.raises(ParameterError, match="the bare surface bounds no volume"):
+        surface.write(tmp_path / "surface.3mf")
+
+
+def test_a_field_that_does_not_vary_is_a_number() -> None:
+    number, field = fill(ball(), CELL, WALL, fit=COARSE).report, fill(ball(), CELL, f"{WALL} + 0*x", fit=COARSE).report
+    assert field.volume == pytest.approx(number.volume, rel=1e-3)
+
+
+def test_a_field_is_of_places_in_the_part_and_turns_with_it() -> None:
+    # A quarter turn about z is a symmetry of nothing here: part, lattice and field are turned alike.
+    part = cq.Workplane().box(4, 5, 3).translate((5, 4, 6))
+    turned = part.rotate((0, 0, 0), (0, 0, 1), 90)
+    before = fill(part, CELL, "0.6 + 0.08*x", fit=COARSE).report
+    after = fill(turned, CELL, "0.6 + 0.08*y", rotation=(0, 0, 90), fit=COARSE).report
+    assert after.volume == pytest.approx(before.volume, rel=1e-6)
+    assert (before.smallest_wall, before.thickness) == pytest.approx((after.smallest_wall, after.thickness), rel=1e-6)
+    assert before.smallest_wall < before.thickness
+
+
+def test_a_wall_that_varies_and_the_channels_it_leaves_are_the_whole_part() -> None:
+    both = [fill(ball(), CELL, "0.7 + 0.05*z", kind=kind, fit=COARSE).report for kind in ("sheet", "channels")]
+    assert sum(report.volume for report in both) == pytest.approx(BALL, rel=1e-5)
+
+
+def test_a_block_of_cells_round_the_part_fills_it_as_an_endless_lattice_does() -> None:
+    block = fill(ball(), lattice=Lattice((1, 1, 1), CELL, WALL, fit=COARSE)).report
+    assert block.volume == pytest.approx(filled_straight().volume, rel=1e-6)
+    assert (block.solids, block.faces) == (filled_straight().solids, filled_straight().faces)
+
+
+@lru_cache(maxsize=1)
+def filled_straight() -> Any:
+    return fill(ball(), CELL, WALL, fit=COARSE).report
+
+
+def test_a_block_carried_by_a_map_ends_in_the_part_with_its_own_side_walls() -> None:
+    twisted = Lattice((1, 1, 1), CELL, WALL, map="twist:angle=20", tolerance=1e-3)
+    half = fill(ball(), lattice=twisted, origin=(5.0, 0, 0)).report
+    assert half.valid
+    assert half.closed
+    assert 0 < half.volume < 0.8 * filled_straight().volume
+
+
+def test_a_skin_is_kept_and_fused_with_what_fills_the_core() -> None:
+    skin = 0.4
+    inner = RADIUS - skin
+    core = cq.Workplane(origin=(5.0, 4.0, 6.0)).sphere(inner)
+    made, within = fill(ball(), CELL, WALL, fit=COARSE, skin=skin), fill(core, CELL, WALL, fit=COARSE)
+    assert made.report.solids == 1
+    assert made.report.volume == pytest.approx(BALL - 4 / 3 * np.pi * inner**3 + within.report.volume, rel=1e-4)
+    assert made.report.smallest_wall == skin
+    assert is_valid(made.solid())
+
+
+def test_a_box_with_a_skin_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    box = cq.Workplane().box(7, 8, 6).translate((5, 4, 6))
+    sections, channels = (
+        fill(box, CELL, WALL, kind=kind, fit=COARSE, skin=0.7).report for kind in ("sheet", "channels")
+    )
+    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill: self._by_booleans(infill))
+    booleans = fill(box, CELL, WALL, fit=COARSE, skin=0.7).report
+    assert sections.by_sections
+    assert sections.volume + channels.volume == pytest.approx(7 * 8 * 6, rel=1e-9)
+    assert (sections.volume, sections.area) == pytest.approx((booleans.volume, booleans.area), rel=1e-5)
+    assert (sections.solids, sections.faces) == (booleans.solids, booleans.faces)
+
+
+def test_channels_within_a_skin_are_those_of_the_core() -> None:
+    channels, wall = (
+        fill(ball(), CELL, WALL, kind=kind, fit=COARSE, skin=0.4).report for kind in ("channels", "sheet")
+    )
+    assert channels.volume + wall.volume == pytest.approx(BALL, rel=1e-4)
+
+
+def test_files_are_written_and_read_back(tmp_path: Path) -> None:
+    filled().write(*(tmp_path / f"light.{ending}" for ending in ("step", "stl", "3mf")), deviation=0.1)
+    shape = read_step(tmp_path / "light.step")
+    assert is_valid(shape)
+    assert topology(shape).closed
+    assert measure(shape)[0] == pytest.approx(filled().report.volume, rel=1e-5)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["light.3mf", "light.step", "light.stl"]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"part": 3}, "part = 3"),
+        ({"part": TopoDS_Shape()}, "an empty one"),
+        ({"part": next(parts_of(cq.Workplane().box(1, 1, 1).val().wrapped, TopAbs_FACE))}, "there is none in it"),
+        ({"cell_size": 0}, "cell_size = 0"),
+        ({"cell_size": float("nan")}, "cell_size = nan"),
+        ({"thickness": None}, "exactly one of the two"),
+        ({"density": 0.3}, "exactly one of the two"),
+        ({"thickness": 4.0}, "below 3.7647 mm"),
+        ({"kind": "truss"}, " or ".join(KINDS)),
+        ({"kind": "network-a"}, "the labyrinth's volume fraction"),
+        ({"kind": "network-a", "thickness": None, "density": "0.3 + 0.01*x"}, "one number above 0.02983"),
+        ({"kind": "surface"}, "thickness = 0.9: expected none: the bare surface has no wall"),
+        ({"kind": "surface", "thickness": None, "skin": 1}, "skin = 1: expected none round the bare surface"),
+        ({"thickness": "0.9 + 0.1*q"}, "thickness"),
+        ({"thickness": "1 - x"}, "at (x, y, z) = ("),
+        ({"skin": 0}, "skin = 0"),
+        ({"skin": 9}, "skin = 9"),
+        ({"openings": [">Z"]}, "none without a skin"),
+        ({"skin": 0.4, "openings": ["up"]}, "openings = 'up'"),
+        ({"skin": 0.4, "openings": [(50, 0, 0)]}, "a point on a face; the nearest is"),
+        ({"tolerance": 2}, "tolerance = 2"),
+        ({"lattice": Lattice((1, 1, 1), 10, 1)}, "cell_size = 10.0: expected none beside a lattice"),
+        ({"kind": "network-a", "thickness": None, "density": 0.01}, "above 0.02983"),
+        ({"origin": (0, 0)}, "origin = (0, 0): expected three finite numbers"),
+        ({"rotation": 3}, "rotation = 3: expected three finite numbers"),
+        ({"material_density": -1}, "material_density = -1"),
+        ({"part": cq.Workplane().box(9, 9, 0.5)}, "less than the part's smallest extent, 0.5 mm"),
+    ],
+)
+def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], words: str) -> None:
+    arguments = {"part": ball(), "cell_size": CELL, "thickness": WALL, **given}
+    with pytest.raises(ParameterError) as caught:
+        fill(**arguments)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"not STEP at all", b"ISO-10303-21;\nHEADER;\nENDSEC;\n"])
+def test_a_file_that_is_no_part_is_an_error(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "part.step").write_bytes(content)
+    for path in (tmp_path / "part.step", tmp_path / "none.step"):
+        with pytest.raises(ExportError, match=r"part\.step|none\.step"):
+            fill(path, CELL, WALL)
+
+
+def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    split, calls = gyroid_cad.kernel.regions.split_by_region, []
+
+    def failing_once(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 1:
+            raise KernelError("tangent")
+        return split(*arguments)
+
+    monkeypatch.setattr(gyroid_cad.kernel.regions, "split_by_region", failing_once)
+    report = fill(ball(), CELL, WALL, fit=COARSE).report
+    assert len(calls) == 2
+    assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
+    assert report.valid
+
+
+@pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
+def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
+    solids = [ball().val().wrapped] if wrong == "the part itself" else []
+    monkeypatch.setattr(gyroid_cad.kernel.regions, "split_by_region", lambda *arguments: None)
+    monkeypatch.setattr(gyroid_cad.kernel.split, "bounded_solids", lambda *arguments: solids)
+    with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
+        fill(ball(), CELL, WALL, fit=COARSE)

@@ -22,7 +22,7 @@ from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.fields.paper import paper_units
+from gyroid_cad.fields.makers import paper_units
 from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh

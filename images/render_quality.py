@@ -24,7 +24,7 @@ from gyroid_cad.mesh.finite_elements.quality import (
     shown_name,
     shown_number,
 )
-from gyroid_cad.mesh.finite_elements.quality_picture import draw_quality
+from gyroid_cad.mesh.finite_elements.summaries import draw_quality
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 
 Floats = NDArray[np.float64]

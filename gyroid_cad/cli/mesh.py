@@ -74,7 +74,7 @@ def mesh_command(
         raise click.UsageError("Missing option '-o' / '--output'.")
     targets = require_distinct(output, lambda path: require_mesh_format(path, full))
     if histogram is not None:
-        from gyroid_cad.mesh.finite_elements.quality_picture import draw_quality, require_histogram
+        from gyroid_cad.mesh.finite_elements.summaries import draw_quality, require_histogram
 
         require_histogram(histogram)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:

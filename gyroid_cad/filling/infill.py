@@ -26,7 +26,7 @@ from gyroid_cad.wall.covering import (
     wall_extremes,
 )
 from gyroid_cad.wall.exact import laid_patches, patch_points
-from gyroid_cad.wall.graded_fit import fit_wall
+from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.surface.tube import TubeLaw
+from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.limits import require_density, require_one, require_thickness
 
 __all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]

@@ -22,8 +22,8 @@ from OCP.TopTools import TopTools_MapOfShape
 
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of
-from gyroid_cad.kernel.core import core_of
 from gyroid_cad.kernel.depth import Depths, Faces, points_on
+from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.split import Change, Pieces, compound_of, images, inner_sides, solids_of
 

@@ -28,8 +28,7 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
-from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry, parameter_line
-from gyroid_cad.kernel.surfaces import kernel_curve
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, parameter_line
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.wall.offset import SIDES, Wall
 

@@ -16,8 +16,7 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, Top
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
-from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry
-from gyroid_cad.kernel.surfaces import kernel_curve, kernel_knots
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.trim.box import BoxEdge, BoxedWall, BoxFace
 from gyroid_cad.trim.caps import Cap, plane_axes

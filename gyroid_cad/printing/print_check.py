@@ -14,8 +14,8 @@ from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import read_triangles
+from gyroid_cad.mesh.triangles.measures import measured_walls
 from gyroid_cad.mesh.triangles.shells import Shells, shells_of
-from gyroid_cad.mesh.triangles.wall_thickness import measured_walls
 from gyroid_cad.printing.printers import Printer, printer_named
 from gyroid_cad.wall.complex import CellComplex, connected
 from gyroid_cad.wall.pore_limits import narrowest_opening, throat_diameter

@@ -7,7 +7,7 @@ from numbers import Integral
 
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.surface.tube import TubeLaw
+from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import THINNEST_WALL
 
 __all__ = [

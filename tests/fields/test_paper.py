@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad import Lattice
 from gyroid_cad.errors import ParameterError, SoundnessError
 from gyroid_cad.fields.field import Field
-from gyroid_cad.fields.paper import PaperUnits, paper_units
+from gyroid_cad.fields.makers import PaperUnits, paper_units
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, placed_corners
 from gyroid_cad.wall.complex import CellComplex, build_complex

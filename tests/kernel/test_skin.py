@@ -15,7 +15,6 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import cKDTree
 
-import gyroid_cad.kernel.core
 import gyroid_cad.kernel.offset
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
@@ -232,7 +231,7 @@ def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatc
     def wrong(*arguments: Any) -> Iterator[TopoDS_Shape | None]:
         yield from len(CLOSED_WAYS) * [None if given is None else wrapped(given)]
 
-    monkeypatch.setattr(gyroid_cad.kernel.core, "offsets", wrong)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", wrong)
     with pytest.raises(KernelError, match="cannot offset the part by 1 mm; without a skin it can still be filled"):
         parted(box())
 

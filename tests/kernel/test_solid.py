@@ -35,11 +35,10 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 from gyroid_cad.kernel.check import enclosed_volume, topology
 from gyroid_cad.kernel.solid import TOLERANCE, another_handle, realise
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.surface.patch import smooth
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import SIDES, Wall, build_wall
 

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.report.distributions import distribution_of
 from gyroid_cad.report.pores import Pores, inscribed_spheres, pores_of
+from gyroid_cad.report.wall_thickness import distribution_of
 from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.patch import PARAMETERISATIONS

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, placed_corners
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, bounding_cell, placed_corners
 from gyroid_cad.wall import complex as complex_module
 from gyroid_cad.wall.complex import CellComplex, build_complex
 

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.nurbs.surface import NurbsSurface, basis, gauss_points
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch, largest_offset
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import SIDES, Wall, build_wall
 

@@ -12,14 +12,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.determinants import hexahedron_nodes, sample_places, shape_gradients
 from gyroid_cad.mesh.finite_elements.quality import (
     USUAL_BOUNDS,
     combined,
     element_measures,
+    hexahedron_nodes,
     inverted,
     quality_report,
     quality_rows,
+    sample_places,
+    shape_gradients,
 )
 
 Floats = NDArray[np.float64]

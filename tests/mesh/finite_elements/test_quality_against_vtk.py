@@ -11,8 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gyroid_cad.mesh.finite_elements.determinants import HEXAHEDRA, hexahedron_nodes, shape_gradients
-from gyroid_cad.mesh.finite_elements.quality import element_measures
+from gyroid_cad.mesh.finite_elements.quality import HEXAHEDRA, element_measures, hexahedron_nodes, shape_gradients
 
 Floats = NDArray[np.float64]
 

@@ -20,8 +20,7 @@ from gyroid_cad.fields.makers import linear
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.measuring import enclosed_volume, face_cases, face_deviations
-from gyroid_cad.mesh.triangles.subdivision import MOST_STEPS, subdivided
-from gyroid_cad.mesh.triangles.triangulation import Triangulation, triangulated
+from gyroid_cad.mesh.triangles.triangulation import MOST_STEPS, Triangulation, subdivided, triangulated
 from gyroid_cad.nurbs.surface import NurbsSurface
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.offset import SIDES, Wall

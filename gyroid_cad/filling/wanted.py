@@ -42,10 +42,10 @@ class Region:
     surface: bool = False
     fluid: bool = False
 
-    def holds(self, offsets: Floats, halves: Floats) -> Booleans:
+    def contains(self, offsets: Floats, half_thickness: Floats) -> Booleans:
         """Which offsets, in mm, lie between, where the half wall is so many mm."""
-        low = -np.inf if self.lowest is None else self.lowest * halves
-        high = np.inf if self.highest is None else self.highest * halves
+        low = -np.inf if self.lowest is None else self.lowest * half_thickness
+        high = np.inf if self.highest is None else self.highest * half_thickness
         return np.asarray((offsets > low) & (offsets < high))
 
     @property
@@ -131,8 +131,8 @@ def _wall(
 
 
 def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
-    low, high = (1 - tube.largest_density) / 2, (1 + tube.largest_density) / 2
-    accepted = f"the labyrinth's volume fraction, one number above {low:.5f} and below {high:.5f}"
+    low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
+    accepted = f"the network's volume fraction, one number above {low:.5f} and below {high:.5f}"
     fraction = finite_number("density", density, accepted)
     if not low < fraction < high:
         raise ParameterError("density", density, accepted)

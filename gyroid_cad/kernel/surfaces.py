@@ -138,7 +138,7 @@ class WallGeometry:
             self._side_walls[key] = kernel_surface(self.wall.side_wall(*key))
         return self._side_walls[key]
 
-    def rim(self, patch: int, k: int, side: int) -> Geom_BSplineCurve:
+    def face_edge(self, patch: int, k: int, side: int) -> Geom_BSplineCurve:
         """Border curve k of a face, run the way the complex's edge runs, on [-1, 1]."""
         forward = self._forward[patch][k]
         key = (self._patch_net[patch], k, side, forward)

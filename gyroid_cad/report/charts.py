@@ -176,7 +176,7 @@ TITLES: Mapping[str, str] = MappingProxyType(
 )
 NOTES: Mapping[str, str] = MappingProxyType(
     {
-        "measures": "Face A looks into the labyrinth that the surface's normal points to, face B into the other; the "
+        "measures": "Face A looks into the network that the surface's normal points to, face B into the other; the "
         "rim closes the wall where the lattice ends.",
         "wall": "Measured from one fitted face to the other along the normal of the exact mid-surface; shares are of "
         "the mid-surface's area.",
@@ -203,9 +203,9 @@ LABELS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "bounding_box_low": ("bounding box from", "mm"),
         "bounding_box_high": ("bounding box to", "mm"),
         "extent": ("extent", "mm"),
-        "pieces": ("pieces that hang together", ""),
-        "free_edges": ("edges of the mid-surface that end the lattice", ""),
-        "pinch_lines": ("pinch lines", ""),
+        "pieces": ("pieces that are connected", ""),
+        "boundary_edges": ("edges of the mid-surface that end the lattice", ""),
+        "non_manifold_edges": ("non-manifold edges", ""),
         "volume": ("volume", "mm³"),
         "volume_exact": ("volume, exact", "mm³"),
         "volume_error": ("volume, fitted / exact - 1", ""),
@@ -229,11 +229,11 @@ LABELS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "beyond": ("beyond the block", ""),
         "spacing": ("looked up every", "mm"),
         "porosity_counted": ("porosity, counted there", ""),
-        "channel_a": ("labyrinth A", ""),
-        "channel_b": ("labyrinth B", ""),
+        "channel_a": ("network A", ""),
+        "channel_b": ("network B", ""),
         "count": ("inscribed spheres", ""),
-        "smallest_diameter": ("smallest diameter", "mm"),
-        "largest_diameter": ("largest diameter", "mm"),
+        "min_diameter": ("smallest diameter", "mm"),
+        "max_diameter": ("largest diameter", "mm"),
         "open_edges": ("open edges", ""),
         "format": ("format", ""),
         "bytes": ("size", "bytes"),

@@ -25,7 +25,7 @@ _FEWEST_STEPS, _MOST_STEPS = 6, 48
 _PAIRS_AT_ONCE = 200_000
 # In steps between samples: the foot belongs to the nearest sample along each side, and a little is overlap.
 _OWN_FOOT = 0.6
-# A place lies in the wall only if it stands over its foot: beyond a free edge the foot is aside.
+# A place lies in the wall only if it stands over its foot: beyond a boundary edge the foot is aside.
 _UPRIGHT = 0.9
 
 

@@ -50,14 +50,14 @@ class TubeLaw:
     thickness_limit: float
 
     @property
-    def largest_thickness(self) -> float:
+    def max_thickness(self) -> float:
         """The wall must be thinner, in cell sizes."""
         return self.thickness_limit * (1 - _SOUNDNESS_MARGIN)
 
     @property
-    def largest_density(self) -> float:
+    def max_density(self) -> float:
         """The wall must take up less than this part of space."""
-        return self.density(self.largest_thickness)
+        return self.density(self.max_thickness)
 
     @property
     def _cubic(self) -> float:
@@ -83,7 +83,7 @@ class TubeLaw:
         Parameters
         ----------
         density : float or ndarray
-            From 0 to :attr:`largest_density`.
+            From 0 to :attr:`max_density`.
 
         Returns
         -------
@@ -101,9 +101,9 @@ class TubeLaw:
         return self.area + 2 * pi * self.euler_characteristic * (thickness / 2) ** 2
 
     def network_offset(self, density: float) -> float:
-        """How far from the surface a labyrinth begins that takes up a given part of space.
+        """How far from the surface a network begins that takes up a given part of space.
 
-        One labyrinth is half of space less half of a wall: 1/2 - A s - (2 pi chi / 3) s^3 at the distance s.
+        One network is half of space less half of a wall: 1/2 - A s - (2 pi chi / 3) s^3 at the distance s.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class TubeLaw:
         Returns
         -------
         float
-            Along the normal, in cell sizes; negative where the labyrinth takes up more than half.
+            Along the normal, in cell sizes; negative where the network takes up more than half.
         """
         half = self.thickness(abs(1 - 2 * density)) / 2
         return half if density < 0.5 else -half

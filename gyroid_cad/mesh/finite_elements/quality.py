@@ -45,7 +45,7 @@ __all__ = [
     "inverted",
     "quality_report",
     "quality_rows",
-    "sample_places",
+    "sample_points",
     "sampled_determinants",
     "shape_gradients",
     "shown_name",
@@ -68,7 +68,7 @@ def hexahedron_nodes(count: int) -> Floats:
     return _NODES[:count].copy()
 
 
-def sample_places(count: int) -> Floats:
+def sample_points(count: int) -> Floats:
     """The nodes of a hexahedron of 8, 20 or 27, and the Gauss points of full integration; shape (samples, 3)."""
     along = np.polynomial.legendre.leggauss(_GAUSS_POINTS[count])[0]
     return np.concatenate([_NODES[:count], np.array(list(product(along, repeat=3)))])
@@ -166,7 +166,7 @@ def _determinants(columns: Floats, none: Floats) -> Floats:
 
 @lru_cache
 def _sampled_gradients(count: int) -> Floats:
-    return shape_gradients(count, sample_places(count))
+    return shape_gradients(count, sample_points(count))
 
 
 def _exponents(count: int) -> NDArray[np.int64]:

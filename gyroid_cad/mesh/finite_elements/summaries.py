@@ -62,8 +62,8 @@ _KINDS = {
     "edge_ratio": _Kind(False, 4.0, 1.0, 11.0, 200),
     "skew": _Kind(False, 0.5, 0.0, 1.0, 100),
     "warpage": _Kind(False, 0.1, 0.0, 2.0, 400),
-    "smallest_angle": _Kind(True, 45.0, 0.0, 90.0, 90),
-    "largest_angle": _Kind(False, 135.0, 90.0, 360.0, 135),
+    "min_angle": _Kind(True, 45.0, 0.0, 90.0, 90),
+    "max_angle": _Kind(False, 135.0, 90.0, 360.0, 135),
     "determinant_ratio": _Kind(True, 0.3, -1.0, 1.0, 200),
     "sampled_scaled_jacobian": _Kind(True, 0.5, -1.0, 1.0, 200),
 }
@@ -130,7 +130,7 @@ class Quality:
         Hexahedra with a determinant that is not positive at one of their nodes or Gauss points.
     measures : mapping of str to MeasureSummary
         Of quadrilaterals and hexahedra ``scaled_jacobian``, ``aspect_ratio``, ``edge_ratio``, ``skew``, ``warpage``,
-        ``smallest_angle`` and ``largest_angle`` (degrees); of hexahedra ``determinant_ratio`` too, and of quadratic
+        ``min_angle`` and ``max_angle`` (degrees); of hexahedra ``determinant_ratio`` too, and of quadratic
         ones ``sampled_scaled_jacobian``.
     """
 

@@ -32,7 +32,7 @@ class TriangleMeasures:
     open_edges : int
         Edges used more often one way than the other.
     pieces : int
-        That hang together by vertices.
+        That are connected by vertices.
     low, high : tuple of float
         Corners of the bounding box, in mm.
     volume, area : float

@@ -27,7 +27,7 @@ _MARGIN = 1.05
 _FIRST_STEPS = 8
 # There triangles are nearer to the faces, about 1e-5 of the cell size, than the usual fit is to the exact gyroid.
 MOST_STEPS = 128
-# Between the deviation that would just do and the one named as possible: corners are laid off, counts rounded up.
+# Between the deviation that would just do and the one named as possible: corners are offset, counts rounded up.
 _SLACK = 1.5
 # Where counts are more than these they are rounded up to three binary digits, so that few templates are needed.
 _FEW_COUNTS = 4
@@ -131,7 +131,7 @@ def _steps_of_edges(wall: Wall, patch_steps: Integers) -> Integers:
 
 
 def _steps_of_side_walls(wall: Wall, free: Integers, steps: Integers, limit: float) -> Integers:
-    """Steps along free edges, raised where the lines along the side walls would take too much of the deviation."""
+    """Steps along boundary edges, raised where the lines along the side walls would take too much of the deviation."""
     while np.all(steps <= MOST_STEPS):
         deviations, which = side_deviations(wall, free, steps, _lines_along)
         enough = np.maximum(steps, _enough(steps, deviations[which], _SHARE_OF_EDGES * limit))
@@ -185,7 +185,7 @@ class Triangulation:
         Steps of the free side walls, through the wall.
     deviation : float
         Largest distance of a triangle from the wall's faces, in mm, as measured.
-    laid_off : float
+    volume_offset : float
         In mm, how far from the wall's faces the corners lie at most.
     parting : float
         In mm, how far corners are moved where patches touch in a line without joining.
@@ -198,7 +198,7 @@ class Triangulation:
     edge_steps: Integers
     across: int
     deviation: float
-    laid_off: float
+    volume_offset: float
     parting: float
     volume: float
 
@@ -217,7 +217,7 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
     """Find the steps with which triangles keep within a deviation of a wall.
 
     Triangles with their corners on the faces of a gyroid wall enclose too little, about as much as they deviate. So
-    the corners are laid off along the lines through the wall, all by the same small part of its thickness, until
+    the corners are offset along the lines through the wall, all by the same small part of its thickness, until
     the triangles enclose the wall's own volume. Faces, edges and side walls stay those of one wall, a little thicker,
     and the deviation counts what was added.
 
@@ -232,16 +232,16 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
     ParameterError
         If a patch would take too many steps, saying which deviation would do.
     """
-    volume, thickest = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
+    volume, max_thickness = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
     reserved = 0.0
     while True:
         steps = subdivided(wall, deviation, reserved)
         thicker, enclosed, part = _of_volume(wall, steps, volume)
-        laid_off = abs(part) * thickest
-        if steps.deviation + laid_off <= deviation:
+        volume_offset = abs(part) * max_thickness
+        if steps.deviation + volume_offset <= deviation:
             break
-        # What is laid off falls with the rest: never all is reserved for it.
-        reserved = min(laid_off, (deviation + reserved) / 2)
+        # What is offset falls with the rest: never all is reserved for it.
+        reserved = min(volume_offset, (deviation + reserved) / 2)
     furthest = float(np.abs(thicker.nets).max() + np.abs(wall.shifts).max())
     parting = max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
     return Triangulation(
@@ -249,15 +249,15 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
         patch_steps=steps.patch_steps,
         edge_steps=steps.edge_steps,
         across=steps.across,
-        deviation=steps.deviation + laid_off,
-        laid_off=laid_off,
+        deviation=steps.deviation + volume_offset,
+        volume_offset=volume_offset,
         parting=parting,
         volume=enclosed,
     )
 
 
 def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, float, float]:
-    """The wall laid off so that its triangles enclose a volume, what they enclose, and by which part of itself."""
+    """The wall offset so that its triangles enclose a volume, what they enclose, and by which part of itself."""
     part, thicker = 0.0, wall
     enclosed = enclosed_volume(wall, steps.patch_steps, steps.edge_steps, steps.across)
     # Of a thin wall the volume goes with the thickness, which grows on both sides.
@@ -265,7 +265,7 @@ def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, flo
     for _ in range(_SECANT_STEPS):
         if abs(following - part) < _NOTHING:
             break
-        thicker = _laid_off(wall, following)
+        thicker = _offset(wall, following)
         found = enclosed_volume(thicker, steps.patch_steps, steps.edge_steps, steps.across)
         slope = (found - enclosed) / (following - part)
         part, enclosed = following, found
@@ -273,7 +273,7 @@ def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, flo
     return thicker, enclosed, part
 
 
-def _laid_off(wall: Wall, part: float) -> Wall:
+def _offset(wall: Wall, part: float) -> Wall:
     """The wall with both faces moved outwards by a part of its thickness."""
     through = part * (wall.nets[:, 1] - wall.nets[:, 0])
     return replace(wall, nets=wall.nets + np.stack([-through, through], axis=1))

@@ -135,7 +135,7 @@ class PrintCheck:
         how = f" at {self.walls_measured:,} places" if self.walls_measured else ""
         verdict = {
             "good": "good",
-            "supported only": f"good but at boundary edges; there too from a scale of {_rounded_up(self.scale_for_wall)}",
+            "supported only": f"good but at boundary edges; there from a scale of {_rounded_up(self.scale_for_wall)}",
             "too thin": f"too thin: passes from a scale of {_rounded_up(self.scale_for_supported_wall)}, "
             f"boundary edges from {_rounded_up(self.scale_for_wall)}",
         }[self.wall]

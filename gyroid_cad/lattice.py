@@ -22,7 +22,7 @@ from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.fields.paper import paper_units
+from gyroid_cad.fields.makers import paper_units
 from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
@@ -34,14 +34,14 @@ from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings, fit_within
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import LaidWall, Recipe, laid_wall
+from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.limits import (
     require_cell_size,
     require_density,
     require_one,
     require_thickness,
-    sound_tolerance,
+    valid_tolerance,
     whole_cells,
 )
 from gyroid_cad.wall.offset import Wall
@@ -54,7 +54,7 @@ __all__ = ["Lattice", "LatticeReport", "MapLike"]
 Corner = tuple[float, float, float]
 MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
-# Of a lattice that varies, in cell sizes.
+# Of a graded lattice, in cell sizes.
 USUAL_TOLERANCE = 1e-4
 BOX = "box"
 _LENGTH = "a length in mm, a finite number"
@@ -83,12 +83,12 @@ class Lattice:
     cell_size : float
         Period L of the cubic cell, in mm.
     thickness : number or field, optional
-        Whole wall along the normal of the finished mid-surface, in mm; less than 0.37647 L where cells are alike.
+        Whole wall along the normal of the finished mid-surface, in mm; less than 0.37647 L where it is uniform.
     density : number or field, optional
         Volume fraction instead of thickness, less than 0.94033. Where it or the space varies the tube
         formula is inverted place by place, and the wall stretched as the space across it is.
     fit : FitSettings
-        How the patch is fitted. Where the lattice varies, its control points are the fewest to try.
+        How the patch is fitted. Where the lattice is graded, its control points are the fewest to try.
     scale_field : number or field, optional
         Cells grow and shrink by it: a place p is moved to scale_field(p) p, the paper's variable BC length.
     map : SpaceMap, Cylinder, Sphere, Twist, Bend, str or callable, optional
@@ -96,7 +96,7 @@ class Lattice:
         function of x, y, z that returns three arrays.
     tolerance : float, optional
         Largest deviation of the fit in cell sizes: the number of control points rises until it is met. If left
-        out, 1e-4 where the lattice varies, and ``fit`` as it is where cells are alike.
+        out, 1e-4 where the lattice is graded, and ``fit`` as it is where it is uniform.
     trim : {"box"}, optional
         Cut to the block of cells itself, with flat sides, instead of whole patches. Not where space varies.
     surface : {"gyroid", "diamond", "primitive"}
@@ -195,7 +195,7 @@ class Lattice:
 
     @property
     def wall_thickness(self) -> float:
-        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice varies."""
+        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice is graded."""
         if not self.uniform:
             return self._measures().mean_thickness
         if self.density is None:
@@ -204,7 +204,7 @@ class Lattice:
 
     @property
     def volume_fraction(self) -> float:
-        """The density, whichever of thickness and density was given; the whole block's where the lattice varies."""
+        """The density, whichever of thickness and density was given; the whole block's where the lattice is graded."""
         if not self.uniform:
             return self.exact_volume / block_volume(self.cells, self._grading())
         if self.density is None:
@@ -226,11 +226,11 @@ class Lattice:
         FitError
             If the fit's edges do not meet those of its neighbours.
         """
-        return self.laid().wall
+        return self.fitted().wall
 
     def bounding_box(self) -> tuple[Corner, Corner]:
         """Lowest and highest corner of the box round the wall, in mm."""
-        low, high = (corner.tolist() for corner in self.laid().bounding_box())
+        low, high = (corner.tolist() for corner in self.fitted().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:
@@ -265,7 +265,7 @@ class Lattice:
         built = self.built(progress)
         built.valid(progress)
         with built.timed("fit report"):
-            # Of a wall that varies and is cut there is no exact volume to compare with.
+            # Of a graded wall that is cut there is no exact volume to compare with.
             exact = self.exact_volume if self.uniform or not self.trim else None
             measures = (self.wall_thickness, self.volume_fraction, exact)
         return report_of(built, *measures)
@@ -339,7 +339,7 @@ class Lattice:
         FitError, KernelError
             As of :meth:`solid`.
         """
-        return assembly(self._recipe(), progress)
+        return assembly(self._spec(), progress)
 
     def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
         """Make the assembly if it isn't yet, and say what it is; nothing is written."""
@@ -375,8 +375,8 @@ class Lattice:
             deviation = finite_number("deviation", deviation, _LENGTH)
             require_meshing(deviation)
         # The wall first, so that its progress is told.
-        self.laid(progress)
-        return triangles(self._recipe(), self._deviation(deviation), progress)
+        self.fitted(progress)
+        return triangles(self._spec(), self._deviation(deviation), progress)
 
     def triangle_report(self, deviation: float | None = None, progress: Progress | None = None) -> TriangleReport:
         """Make the triangles if they aren't yet, and say what they are; nothing is written."""
@@ -409,11 +409,11 @@ class Lattice:
         ParameterError
             Also if memory would not do, or an element would be turned inside out.
         """
-        return hexahedral_mesh(self.laid(), subdivisions, layers, order, full)
+        return hexahedral_mesh(self.fitted(), subdivisions, layers, order, full)
 
     def quadrilaterals(self, subdivisions: int, order: int = 1, full: bool = False) -> Mesh:
         """The mid-surface as structured quadrilaterals, as of :meth:`hexahedra`; quadratic ones of 8 nodes, or of 9."""
-        return quadrilateral_mesh(self.laid(), subdivisions, order, full)
+        return quadrilateral_mesh(self.fitted(), subdivisions, order, full)
 
     def volumes(self, degree: int = 1) -> VolumePatches:
         """The wall as trivariate NURBS patches that share their control points, for isogeometric analysis.
@@ -432,7 +432,7 @@ class Lattice:
         ------
         ParameterError
         """
-        return lattice_volumes(self.laid(), degree)
+        return lattice_volumes(self.fitted(), degree)
 
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
@@ -452,14 +452,14 @@ class Lattice:
         ------
         ParameterError
             Also of more cells than a picture could show.
-        SoundnessError, FitError, KernelError
+        SelfIntersectionError, FitError, KernelError
         """
         size, camera = require_view(size, camera)
         if prod(self.cells) > self._most_drawn:
             raise ParameterError("cells", self.cells, f"at most {self._most_drawn} cells in all in a picture")
         if self.trim:
             return shape_picture(self.solid(), size, camera)
-        return wall_picture(self.laid().wall, size, camera)
+        return wall_picture(self.fitted().wall, size, camera)
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
         return mime_bundle(f"{self.surface} lattice", self._shown, self.picture)
@@ -487,22 +487,22 @@ class Lattice:
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files."""
-        return build(self._recipe(), progress)
+        return build(self._spec(), progress)
 
-    def laid(self, progress: Progress | None = None) -> LaidWall:
+    def fitted(self, progress: Progress | None = None) -> FittedWall:
         """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""
-        return laid_wall(self._recipe(), progress)
+        return fitted_wall(self._spec(), progress)
 
     def _deviation(self, given: float | None) -> float:
         """Of triangles, in mm; the usual one if none is given."""
-        return min(self.cell_size / 1000, self.laid().thinnest / 10) if given is None else given
+        return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given
 
-    def _recipe(self) -> Recipe:
+    def _spec(self) -> LatticeSpec:
         settings = self.fit
         if self.uniform and self.tolerance is not None:
             settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
         tolerance = self.tolerance or USUAL_TOLERANCE
-        return Recipe(self.cells, self._grading(), settings, tolerance, self.trim == BOX)
+        return LatticeSpec(self.cells, self._grading(), settings, tolerance, self.trim == BOX)
 
     def _grading(self) -> Grading:
         if self.uniform:
@@ -521,7 +521,7 @@ class Lattice:
         return _measures(self.cells, self._grading())
 
     def _require_variable(self) -> None:
-        """What can be told of a lattice that varies before it is built."""
+        """What can be told of a graded lattice before it is built."""
         for name in ("thickness", "scale_field"):
             if isinstance(value := getattr(self, name), float):
                 positive_number(name, value)
@@ -543,11 +543,11 @@ class Lattice:
             raise ParameterError(
                 "fit",
                 self.fit,
-                "evenly spaced knots, equal weights and the smooth parameterisation where the lattice varies: "
+                "evenly spaced knots, equal weights and the smooth parameterisation where the lattice is graded: "
                 "there the number of control points rises with the tolerance",
             )
         if self.tolerance is not None:
-            object.__setattr__(self, "tolerance", sound_tolerance(self.tolerance))
+            object.__setattr__(self, "tolerance", valid_tolerance(self.tolerance))
 
 
 @lru_cache(maxsize=16)

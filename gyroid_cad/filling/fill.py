@@ -20,13 +20,14 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
-from gyroid_cad.lattice import USUAL_TOLERANCE, Lattice
+from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.part import Part

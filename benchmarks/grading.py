@@ -26,7 +26,6 @@ from gyroid_cad import Cylinder, Lattice
 from gyroid_cad.builds.solid import Build
 from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.kernel.step import write_step
-from gyroid_cad.lattice import USUAL_TOLERANCE
 from gyroid_cad.nurbs.surface import basis
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
@@ -34,6 +33,7 @@ from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.exact import _exact_grid
 from gyroid_cad.wall.fitted import LatticeSpec, fit_spec
 from gyroid_cad.wall.offset import SIDES, Wall
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 from gyroid_cad.wall.refit import _fit_operator, graded_wall
 
 __all__ = ["main"]
@@ -124,7 +124,7 @@ def _wrapped(places: Floats) -> Floats:
 
 def _built(lattice: Lattice) -> Build:
     """Anew, whatever was built before."""
-    return Build(fit_spec(LatticeSpec(lattice.cells, lattice._grading(), lattice.fit, USUAL_TOLERANCE)), None)
+    return Build(fit_spec(LatticeSpec(lattice.cells, lattice.grading(), lattice.fit, USUAL_TOLERANCE)), None)
 
 
 def _figures(subject: _Subject, built: Build) -> tuple[str, ...]:

@@ -28,13 +28,14 @@ from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.split import compound_of
 from gyroid_cad.kernel.step import read_step
-from gyroid_cad.lattice import USUAL_TOLERANCE, Lattice
+from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 
 __all__ = ["FillReport", "Filled", "fill", "part_of"]
 

@@ -15,10 +15,11 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
 from OCP.GeomAbs import GeomAbs_Arc, GeomAbs_Plane
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
-from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import as_solid
 from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.offset import CLOSED_WAYS, OPEN_WAYS, offsets
 
@@ -104,4 +105,4 @@ def _moved(shape: TopoDS_Shape, by: gp_Vec) -> TopoDS_Shape:
 
 
 def _solids_in(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
-    return [] if shape.IsNull() else [TopoDS.Solid_s(solid) for solid in parts_of(shape, TopAbs_SOLID)]
+    return [] if shape.IsNull() else [as_solid(solid) for solid in parts_of(shape, TopAbs_SOLID)]

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, is_valid, topology
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.stl import meshed
@@ -78,11 +77,9 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
 
 def described(shape: TopoDS_Shape) -> Described:
     """Measure and check a shape, whatever it is."""
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    corners = (0.0,) * 6 if box.IsVoid() else box.Get()
+    low, high = bounding_box(shape).tolist()
     volume, area = measure(shape)
-    return Described(topology(shape), is_valid(shape), tuple(corners[:3]), tuple(corners[3:]), volume, area)
+    return Described(topology(shape), is_valid(shape), tuple(low), tuple(high), volume, area)
 
 
 def shown_triangles(shape: TopoDS_Shape, extent: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:

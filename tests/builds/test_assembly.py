@@ -19,15 +19,16 @@ from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_Label, TDF_LabelSequence
+from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopoDS import TopoDS, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.common import memory
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
+from gyroid_cad.kernel.compat import LabelSequence, as_face
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.lattice import Lattice
@@ -55,13 +56,12 @@ class ReadBack:
     @property
     def faces(self) -> dict[str, tuple[Any, str]]:
         """Face and colour, by name; of the part's colour where a face has none of its own."""
-        labels = TDF_LabelSequence()
+        labels = LabelSequence()
         XCAFDoc_ShapeTool.GetSubShapes_s(self.parts[0], labels)
         whole = colour_of(self.parts[0])
         found = [labels.Value(i) for i in range(1, labels.Length() + 1)]
         return {
-            name_of(label): (TopoDS.Face_s(XCAFDoc_ShapeTool.GetShape_s(label)), colour_of(label) or whole)
-            for label in found
+            name_of(label): (as_face(XCAFDoc_ShapeTool.GetShape_s(label)), colour_of(label) or whole) for label in found
         }
 
 
@@ -86,7 +86,7 @@ def read_assembly(path: Path) -> ReadBack:
     reader = STEPCAFControl_Reader()
     assert reader.ReadFile(str(path)) == IFSelect_RetDone
     assert reader.Transfer(document)
-    roots, components = TDF_LabelSequence(), TDF_LabelSequence()
+    roots, components = LabelSequence(), LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
     assert roots.Length() == 1
     XCAFDoc_ShapeTool.GetComponents_s(roots.First(), components)

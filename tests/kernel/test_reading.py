@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cadquery as cq
+import build123d as bd
 import numpy as np
 import pytest
 
@@ -15,11 +15,11 @@ from gyroid_cad.kernel.reading import described, read_shape, shown_triangles
 
 @pytest.mark.parametrize("ending", [".step", ".stp", ".brep"])
 def test_a_box_is_read_back_with_its_faces_and_size(tmp_path: Path, ending: str) -> None:
-    box, path = cq.Workplane().box(1, 2, 3).val().wrapped, tmp_path / f"box{ending}"
+    box, path = bd.Box(1, 2, 3), tmp_path / f"box{ending}"
     if ending == ".brep":
-        write_brep(box, path)
+        write_brep(box.wrapped, path)
     else:
-        cq.exporters.export(cq.Workplane(cq.Shape.cast(box)), str(path), exportType="STEP")
+        bd.export_step(box, path)
     found = described(read_shape(path))
     assert (found.topology.solids, found.topology.faces, found.topology.closed, found.valid) == (1, 6, True, True)
     assert (found.volume, found.area) == (pytest.approx(6), pytest.approx(22))
@@ -28,14 +28,14 @@ def test_a_box_is_read_back_with_its_faces_and_size(tmp_path: Path, ending: str)
 
 
 def test_a_box_without_its_lid_is_described_as_open() -> None:
-    faces = cq.Workplane().box(1, 2, 3).faces("not >Z").vals()
-    found = described(cq.Shell.makeShell(faces).wrapped)
+    faces = bd.Box(1, 2, 3).faces().sort_by(bd.Axis.Z)[:-1]
+    found = described(bd.Shell(faces).wrapped)
     assert (found.topology.solids, found.topology.faces, found.topology.open_edges) == (0, 5, 4)
     assert not found.topology.closed
 
 
 def test_triangles_to_look_at_are_as_large_as_the_shape() -> None:
-    vertices, triangles = shown_triangles(cq.Workplane().sphere(5).val().wrapped, 10.0)
+    vertices, triangles = shown_triangles(bd.Sphere(5).wrapped, 10.0)
     corners = vertices[triangles].astype(float)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
     assert area == pytest.approx(4 * np.pi * 25, rel=0.01)

@@ -70,7 +70,7 @@ class Facets:
     corners : ndarray, shape (n, 3, 3)
         By triangle, corner and coordinate, in mm.
     normals : ndarray, shape (n, 3, 3)
-        At the corners, out of the solid; of any length but nought.
+        At the corners, out of the solid; of any length but zero.
     colours : ndarray, shape (n, 3)
         Red, green and blue from 0 to 1.
     closed : bool

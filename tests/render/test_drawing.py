@@ -62,7 +62,7 @@ def test_a_closed_surface_looks_the_same_with_or_without_its_back() -> None:
 
 
 def test_a_lattice_looks_the_same_with_or_without_the_backs_of_its_faces() -> None:
-    front = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).laid().wall)
+    front = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).fitted().wall)
     whole = Facets(front.corners, front.normals, front.colours, closed=False)
     pictures = [drawn(facets, VIEWS[0], 150).astype(int) for facets in (front, whole)]
     # Along outlines and edges rounding may choose another triangle.

@@ -79,7 +79,7 @@ def test_the_order_and_the_way_round_of_triangles_change_nothing(seed: int) -> N
     other = triangles[random.permutation(20)]
     other[::2] = other[::2, [0, 2, 1]]
     difference = np.abs(draw(corners, other, (64, 48)).astype(int) - image)
-    # Where a corner's weight is nought but for rounding a pixel may go either way.
+    # Where a corner's weight is zero but for rounding a pixel may go either way.
     assert np.mean(difference > 2) < 2e-3
 
 

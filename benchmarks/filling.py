@@ -33,7 +33,7 @@ from benchmarks.subject import CELL_SIZE, THICKNESS, kernel_volume, sewn
 from benchmarks.timing import Row, best_in_turn, fresh_python, plain_table, print_verdicts
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.check import is_valid, topology
-from gyroid_cad.kernel.solid import realise
+from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import fit_patch
@@ -118,7 +118,7 @@ def _run_alone(what: str) -> None:
     box = _box(low, high)
     if what == "boolean":
         thickness = float(TUBE.thickness(DENSITY)) * SIZE
-        lattice = realise(build_wall(build_complex((cells + 1,) * 3), fit_patch(), SIZE, thickness))
+        lattice = build_solid(build_wall(build_complex((cells + 1,) * 3), fit_patch(), SIZE, thickness))
         start = time.process_time()
         shape = BRepAlgoAPI_Common(lattice, box).Shape()
         seconds, faces = time.process_time() - start, topology(shape).faces

@@ -24,17 +24,17 @@ from numpy.typing import NDArray
 from benchmarks.timing import Row, best_in_turn, plain_table, print_verdicts
 from gyroid_cad import Cylinder, Lattice
 from gyroid_cad.builds.solid import Build
-from gyroid_cad.kernel.solid import realise
+from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.kernel.step import write_step
-from gyroid_cad.lattice import USUAL_TOLERANCE
 from gyroid_cad.nurbs.surface import basis
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.exact import _exact_grid
-from gyroid_cad.wall.fitted import Recipe, lay_wall
+from gyroid_cad.wall.fitted import LatticeSpec, fit_spec
 from gyroid_cad.wall.offset import SIDES, Wall
-from gyroid_cad.wall.refit import _fit_operator, fitted_wall
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE
+from gyroid_cad.wall.refit import _fit_operator, graded_wall
 
 __all__ = ["main"]
 
@@ -124,17 +124,17 @@ def _wrapped(places: Floats) -> Floats:
 
 def _built(lattice: Lattice) -> Build:
     """Anew, whatever was built before."""
-    return Build(lay_wall(Recipe(lattice.cells, lattice._grading(), lattice.fit, USUAL_TOLERANCE)), None)
+    return Build(fit_spec(LatticeSpec(lattice.cells, lattice.grading(), lattice.fit, USUAL_TOLERANCE)), None)
 
 
 def _figures(subject: _Subject, built: Build) -> tuple[str, ...]:
-    refit = built.laid.refit
+    refit = built.fitted.refit
     assert refit is not None
     return (
         subject.name,
         " x ".join(map(str, built.cells)),
         f"{built.topology.faces}",
-        f"{refit.thinnest:.3f} to {refit.thickest:.3f}",
+        f"{refit.min_thickness:.3f} to {refit.max_thickness:.3f}",
         f"{refit.control_points}",
         f"{refit.max_deviation:.1e}",
         f"{refit.max_deviation / _CELL:.1e}",
@@ -144,17 +144,19 @@ def _figures(subject: _Subject, built: Build) -> tuple[str, ...]:
 
 def _time_rows(built: Build, repeats: int) -> list[Row]:
     """Of case 3, against the kernel's part of it and against the same cells, all alike."""
-    grading, points = built.laid.recipe.grading, len(built.laid.wall.weights)
+    grading, points = built.fitted.spec.grading, len(built.fitted.wall.weights)
 
     def fit() -> Wall:
-        return fitted_wall(built.laid.complex, grading, points)
+        return graded_wall(built.fitted.complex, grading, points)
 
     def first_fit() -> Wall:
         _exact_grid.cache_clear()
         _fit_operator.cache_clear()
         return fit()
 
-    (first, _), (fitting, _), (making, _) = best_in_turn(repeats, first_fit, fit, lambda: realise(built.laid.wall))
+    (first, _), (fitting, _), (making, _) = best_in_turn(
+        repeats, first_fit, fit, lambda: build_solid(built.fitted.wall)
+    )
     lattices = _case_3().lattice, Lattice.paper(built.cells, 0.08, scale=_UNIT)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "lattice.step"
@@ -192,15 +194,15 @@ def _step_bytes(lattice: Lattice, path: Path) -> int:
 
 def _wall_row(subject: _Subject, built: Build, rays: int) -> Row:
     random = np.random.default_rng(_SEED)
-    patches = random.integers(built.laid.complex.patch_count, size=rays)
+    patches = random.integers(built.fitted.complex.patch_count, size=rays)
     u, v = random.uniform(_STEP - 1, 1 - _STEP, (2, rays))
     ahead = _STEP * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])[..., np.newaxis]
     points, _ = PARAMETERISATIONS["smooth"](u + ahead[:, 0], v + ahead[:, 1])
-    places = _places(built.laid.complex, patches, points)
+    places = _places(built.fitted.complex, patches, points)
     middle, along_u, back_u, along_v, back_v = subject.image(places)
     normals = _unit(np.cross(along_u - back_u, along_v - back_v))
     half = subject.thickness(places[0]) / 2
-    distances = (_met(built.laid.wall, patches, side, (u, v), middle, normals, half) for side in SIDES)
+    distances = (_met(built.fitted.wall, patches, side, (u, v), middle, normals, half) for side in SIDES)
     errors = np.abs(np.stack(list(distances)) - half)
     return Row(
         f"{subject.name}: half the wall, relative error",
@@ -211,7 +213,7 @@ def _wall_row(subject: _Subject, built: Build, rays: int) -> Row:
 
 
 def _volume_row(subject: _Subject, built: Build) -> Row:
-    exact = _exact_volume(subject, built.laid.complex)
+    exact = _exact_volume(subject, built.fitted.complex)
     return Row(
         f"{subject.name}: volume, relative error",
         abs(built.volume / exact - 1),

@@ -67,7 +67,7 @@ def _print_writing(lattice: Lattice) -> None:
 
 def _run_alone() -> None:
     lattice = Lattice(_CELLS, CELL_SIZE, 0.1 * CELL_SIZE)
-    wall = lattice.laid().wall
+    wall = lattice.fitted().wall
     along = basis(wall.knots, 3, np.linspace(-1, 1, _SUBDIVISIONS + 1))
     functions = np.kron(along, along)
     nets = wall.nets[wall.patch_net] + wall.shifts[wall.patch_shift][:, np.newaxis, np.newaxis, np.newaxis]

@@ -87,8 +87,8 @@ def _separate_faces(wall: Wall) -> list[TopoDS_Face]:
     locations = [translation(shift) for shift in wall.shifts.tolist()]
     free = wall.complex.free[wall.complex.patch_edges].tolist()
     separate = []
-    for net, shift, free_edges in zip(wall.patch_net.tolist(), wall.patch_shift.tolist(), free, strict=True):
-        surfaces = [*kinds.surfaces[net], *(kinds.side_walls[net, k] for k in range(4) if free_edges[k])]
+    for net, shift, boundary_edges in zip(wall.patch_net.tolist(), wall.patch_shift.tolist(), free, strict=True):
+        surfaces = [*kinds.surfaces[net], *(kinds.side_walls[net, k] for k in range(4) if boundary_edges[k])]
         for surface in surfaces:
             face = BRepBuilderAPI_MakeFace(surface, TOLERANCE).Face()
             separate.append(face.Located(locations[shift]))

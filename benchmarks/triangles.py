@@ -61,9 +61,9 @@ def main(arguments: Sequence[str] = ()) -> bool:
 
 def _against_mesher(wall: Wall, repeats: int) -> list[Row]:
     """Processor time of both, all threads together, and how many triangles each makes of the deviation."""
-    from gyroid_cad.kernel.solid import realise
+    from gyroid_cad.kernel.solid import build_solid
 
-    solid = realise(wall)
+    solid = build_solid(wall)
 
     def ours() -> int:
         return len(indexed_triangles(triangulated(wall, _DEVIATION))[1])
@@ -136,7 +136,7 @@ def _soundness(wall: Wall) -> list[Row]:
 
 
 def _volume(wall: Wall) -> list[Row]:
-    """How fast the volume nears the wall's, before corners are laid off to make up for it."""
+    """How fast the volume nears the wall's, before corners are offset to make up for it."""
     missing = []
     for count in _COUNTS:
         patches, edges = np.full(wall.complex.patch_count, count), np.full(wall.complex.edge_count, count)
@@ -154,7 +154,7 @@ def _print_deviations(wall: Wall) -> None:
             (
                 f"{deviation:g}",
                 f"{made.deviation:.2e}",
-                f"{made.laid_off:.1e}",
+                f"{made.volume_offset:.1e}",
                 f"{made.patch_steps.max()}",
                 f"{made.triangle_count:,}",
                 f"{made.volume / wall.volume() - 1:+.1e}",
@@ -162,7 +162,7 @@ def _print_deviations(wall: Wall) -> None:
         )
     plain_table(
         "What a deviation takes",
-        ("asked for, mm", "measured", "laid off", "squares along a patch", "triangles", "volume off by"),
+        ("asked for, mm", "measured", "offset", "squares along a patch", "triangles", "volume off by"),
         lines,
     )
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import Assembly, AssemblyReport
     from gyroid_cad.builds.meshes import mesh_quality
     from gyroid_cad.builds.triangles import TriangleReport
-    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SoundnessError
+    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SelfIntersectionError
     from gyroid_cad.fields.field import Field
     from gyroid_cad.fields.makers import (
         between_planes,
@@ -63,7 +63,7 @@ __all__ = [
     "ParameterError",
     "PrintCheck",
     "Printer",
-    "SoundnessError",
+    "SelfIntersectionError",
     "SpaceMap",
     "Sphere",
     "TriangleReport",
@@ -93,7 +93,7 @@ __all__ = [
 _HOMES = {
     "builds.assembly": ("Assembly", "AssemblyReport"),
     "maps.block": ("Bend", "Cylinder", "Sphere", "Twist"),
-    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"),
+    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"),
     "fields.field": ("Field",),
     "fields.makers": (
         "between_planes",

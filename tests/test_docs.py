@@ -161,7 +161,7 @@ def test_the_families_table_is_the_codes() -> None:
         "patches per cell": lambda surface: f"{len(surface.cell)}",
         "area per cell": lambda surface: f"{surface.tube.area:.7f} L²",
         "Euler characteristic per cell": lambda surface: f"{surface.tube.euler_characteristic:.0f}",
-        "wall below": lambda surface: f"{surface.tube.largest_thickness:.5f} L",
+        "wall below": lambda surface: f"{surface.tube.max_thickness:.5f} L",
     }
     page = (DOCS / "mathematics" / "families.md").read_text()
     for name, shown in rows.items():

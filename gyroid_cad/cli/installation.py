@@ -81,13 +81,13 @@ class Diagnosis:
     findings: tuple[Finding, ...]
 
     @property
-    def well(self) -> bool:
+    def ok(self) -> bool:
         """Whether nothing that is required is missing or fails."""
         return all(finding.state == GOOD for finding in self.findings if finding.required)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
-        return {"well": self.well, "findings": [asdict(finding) for finding in self.findings]}
+        return {"ok": self.ok, "findings": [asdict(finding) for finding in self.findings]}
 
 
 def kernel_version() -> str:
@@ -202,6 +202,6 @@ def _stl_is_closed(folder: Path) -> str:
     return f"{int(shells.triangles.sum()):,} triangles, closed, volume off by {error:+.1e}"
 
 
-def _require(holds: bool, problem: str) -> None:
-    if not holds:
+def _require(contains: bool, problem: str) -> None:
+    if not contains:
         raise RuntimeError(problem)

@@ -108,7 +108,7 @@ _OPTIONS = (
         "--tolerance",
         type=float,
         metavar="PART",
-        help="Largest deviation in cell sizes; 1e-4 if left out where the lattice varies.",
+        help="Largest deviation in cell sizes; 1e-4 if left out where the lattice is graded.",
     ),
     click.option(
         "--control-points",

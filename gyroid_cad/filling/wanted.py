@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.surface.tube import TubeLaw
+from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.limits import require_density, require_one, require_thickness
 
 __all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
@@ -42,10 +42,10 @@ class Region:
     surface: bool = False
     fluid: bool = False
 
-    def holds(self, offsets: Floats, halves: Floats) -> Booleans:
+    def contains(self, offsets: Floats, half_thickness: Floats) -> Booleans:
         """Which offsets, in mm, lie between, where the half wall is so many mm."""
-        low = -np.inf if self.lowest is None else self.lowest * halves
-        high = np.inf if self.highest is None else self.highest * halves
+        low = -np.inf if self.lowest is None else self.lowest * half_thickness
+        high = np.inf if self.highest is None else self.highest * half_thickness
         return np.asarray((offsets > low) & (offsets < high))
 
     @property
@@ -131,8 +131,8 @@ def _wall(
 
 
 def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
-    low, high = (1 - tube.largest_density) / 2, (1 + tube.largest_density) / 2
-    accepted = f"the labyrinth's volume fraction, one number above {low:.5f} and below {high:.5f}"
+    low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
+    accepted = f"the network's volume fraction, one number above {low:.5f} and below {high:.5f}"
     fraction = finite_number("density", density, accepted)
     if not low < fraction < high:
         raise ParameterError("density", density, accepted)

@@ -66,7 +66,7 @@ class Part:
     volume: float
     box: Box | None = None
 
-    def holds(self, points: Floats) -> Booleans:
+    def contains(self, points: Floats) -> Booleans:
         """Which points, shape (n, 3), lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
         inside = np.zeros(len(points), dtype=bool)
         for solid in self.solids:

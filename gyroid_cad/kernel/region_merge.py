@@ -33,7 +33,7 @@ from OCP.TopoDS import (
 )
 
 from gyroid_cad.kernel.region_split import NEW, Edge, Found, Piece, Task, all_of, place_of
-from gyroid_cad.kernel.split import Pieces, changes, compound_of, general_fuse, images, running_like
+from gyroid_cad.kernel.split import Pieces, changes, compound_of, general_fuse, modified, running_like
 
 __all__ = ["Joining"]
 
@@ -71,7 +71,7 @@ class Joining:
         boundary = [
             (TopoDS.Face_s(piece), number)
             for number, face in enumerate(self.task.boundary)
-            for piece in (images(fuse, face) if fuse else [face])
+            for piece in (modified(fuse, face) if fuse else [face])
         ]
         return Pieces(
             tuple(inside),
@@ -135,7 +135,7 @@ class Joining:
     def _edges_on_boundary(self, number: int) -> dict[int, TopoDS_Edge]:
         """A region's edges that lie on the part's boundary, by their numbers."""
         region = self.found[number]
-        sections, grounds, sides = self._read(region)
+        sections, supporting_faces, sides = self._read(region)
         users: dict[int, set[int]] = {}
         for piece in region.pieces:
             for index in piece.edges():
@@ -143,7 +143,7 @@ class Joining:
         made = {}
         for index, edge in enumerate(region.edges):
             if edge.origin == NEW:
-                lying_on = [(self.task.faces[face], grounds[face]) for face in users[index]]
+                lying_on = [(self.task.faces[face], supporting_faces[face]) for face in users[index]]
                 lying_on += [(self.task.boundary[face], sides[face]) for face in edge.beside]
                 made[index] = self._section(next(sections), self._ends(number, edge), lying_on)
             elif edge.beside:
@@ -157,7 +157,7 @@ class Joining:
         shapes = list(_members(shape))
         count = sum(edge.origin == NEW for edge in region.edges)
         faces = [TopoDS.Face_s(face) for face in shapes[count:]]
-        lattice, part = region.grounds
+        lattice, part = region.supporting_faces
         return (
             (TopoDS.Edge_s(edge) for edge in shapes[:count]),
             dict(zip(lattice, faces, strict=False)),
@@ -207,7 +207,7 @@ class Joining:
     def _take_over_vertices(self, fuse: BOPAlgo_Builder) -> None:
         """What vertices have become, with the part's boundary split."""
         for number, vertex in self.vertices.items():
-            for image in images(fuse, vertex):
+            for image in modified(fuse, vertex):
                 self.vertices[number] = TopoDS.Vertex_s(image)
 
     def _face(
@@ -245,7 +245,7 @@ class Joining:
         if fuse is None or index not in on_boundary:
             return [TopoDS.Edge_s(self._lattice_edge(number, self.found[number].edges[index]).Oriented(way))]
         whole = on_boundary[index]
-        runs = [running_like(whole, image, self.context) for image in images(fuse, whole)]
+        runs = [running_like(whole, image, self.context) for image in modified(fuse, whole)]
         if way == TopAbs_FORWARD:
             return [TopoDS.Edge_s(run) for run in runs]
         return [TopoDS.Edge_s(run.Reversed()) for run in reversed(runs)]

@@ -39,7 +39,7 @@ from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.part import Part
-from gyroid_cad.kernel.split import compound_of, general_fuse, images, lies_in
+from gyroid_cad.kernel.split import compound_of, general_fuse, lies_in, modified
 
 __all__ = ["NEW", "Edge", "Finding", "Found", "Piece", "Task", "Values", "all_of", "map_of", "place_of"]
 
@@ -125,7 +125,7 @@ class Found:
         For each of them, the number of the lattice's vertex it stands for, or ``NEW``.
     edges : list of Edge
     pieces : list of Piece
-    grounds : (list of int, list of int)
+    supporting_faces : (list of int, list of int)
         Faces of the lattice, and of the part, on which the sections lie.
     shapes : bytes
         A compound of the sections, in the order of the edges; then of those faces, without edges.
@@ -135,7 +135,7 @@ class Found:
     moved: list[int]
     edges: list[Edge]
     pieces: list[Piece]
-    grounds: tuple[list[int], list[int]]
+    supporting_faces: tuple[list[int], list[int]]
     shapes: bytes
 
 
@@ -181,18 +181,20 @@ class Finding:
         pieces = [
             self._piece(number, TopoDS.Face_s(piece))
             for number in self.region
-            for piece in images(self.fuse, self.task.faces[number])
+            for piece in modified(self.fuse, self.task.faces[number])
             if any(lies_in(piece, classifier, context) for classifier in classifiers)
         ]
         sections = {number for number, edge in enumerate(self.edges) if edge.origin == NEW}
-        grounds = (
+        supporting_faces = (
             sorted({piece.face for piece in pieces if not sections.isdisjoint(piece.edges())}),
             sorted({face for number in sections for face in self.edges[number].beside}),
         )
-        faces = [self.task.faces[face] for face in grounds[0]] + [self.task.boundary[face] for face in grounds[1]]
+        faces = [self.task.faces[face] for face in supporting_faces[0]] + [
+            self.task.boundary[face] for face in supporting_faces[1]
+        ]
         stream = io.BytesIO()
         BinTools.Write_s(compound_of([*self.sections, *(face.EmptyCopied() for face in faces)]), stream)
-        return Found(self.points, self.moved, self.edges, pieces, grounds, stream.getvalue())
+        return Found(self.points, self.moved, self.edges, pieces, supporting_faces, stream.getvalue())
 
     def _boundary_near(self, faces: Iterable[TopoDS_Face]) -> list[TopoDS_Face]:
         """Faces of the part that some of a region's may meet; all of them, if none."""
@@ -206,7 +208,7 @@ class Finding:
         """The part's faces at every edge of their pieces."""
         beside: Values[list[int]] = Values()
         for number, face in enumerate(self.task.boundary):
-            for piece in images(self.fuse, face):
+            for piece in modified(self.fuse, face):
                 for edge in parts_of(piece, TopAbs_EDGE):
                     numbers = beside.setdefault(edge, [])
                     if number not in numbers:
@@ -217,7 +219,7 @@ class Finding:
         """The numbers of the lattice's edges or vertices by what they have become."""
         origins: Values[int] = Values()
         for shape in all_of(shapes):
-            for image in images(self.fuse, shape):
+            for image in modified(self.fuse, shape):
                 origins.setdefault(image, numbers.FindIndex(shape) - 1)
         return origins
 

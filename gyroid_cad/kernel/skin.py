@@ -22,10 +22,10 @@ from OCP.TopTools import TopTools_MapOfShape
 
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of
-from gyroid_cad.kernel.core import core_of
 from gyroid_cad.kernel.depth import Depths, Faces, points_on
+from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.split import Change, Pieces, compound_of, images, inner_sides, solids_of
+from gyroid_cad.kernel.split import Change, Pieces, compound_of, inner_sides, modified, solids_of
 
 __all__ = ["Hollow", "hollow", "openings_of"]
 
@@ -69,7 +69,7 @@ class Hollow:
             Faces that lie in the core uncut, oriented likewise.
         wanted_at : callable
             Whether a point, shape (3,), on the core's boundary belongs to the solid wanted: asked only of pieces of the
-            boundary that hang together with none that the lattice meets.
+            boundary that are connected with none that the lattice meets.
 
         Raises
         ------
@@ -196,18 +196,18 @@ def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face]) -> Hollow:
     fuse.Perform()
     if fuse.HasErrors():
         raise KernelError("the kernel could not part the skin from its core at the openings")
-    solids = [TopoDS.Solid_s(image) for solid in core.solids for image in images(fuse, solid)]
+    solids = [TopoDS.Solid_s(image) for solid in core.solids for image in modified(fuse, solid)]
     core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
     inner, ends = TopTools_MapOfShape(), TopTools_MapOfShape()
     for face in _faces_of(core.shape):
         inner.Add(face)
     for opening in openings:
-        found = [image for image in images(fuse, opening) if inner.Contains(image)]
+        found = [image for image in modified(fuse, opening) if inner.Contains(image)]
         if not found:
             raise KernelError("the kernel's core does not come to an opening")
         for image in found:
             ends.Add(image)
-    pieces = (TopoDS.Face_s(piece) for face in _faces_of(part.shape) for piece in images(fuse, face))
+    pieces = (TopoDS.Face_s(piece) for face in _faces_of(part.shape) for piece in modified(fuse, face))
     skin = tuple(piece for piece in pieces if not inner.Contains(piece))
     made = Hollow(skin, core, tuple(bool(ends.Contains(face)) for face in _faces_of(core.shape)))
     _require_all_of(part, made)

@@ -28,8 +28,7 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
-from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry, parameter_line
-from gyroid_cad.kernel.surfaces import kernel_curve
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, parameter_line
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.wall.offset import SIDES, Wall
 
@@ -37,10 +36,10 @@ __all__ = [
     "TOLERANCE",
     "KernelShape",
     "another_handle",
+    "build_faces",
+    "build_patches",
+    "build_solid",
     "faces_by_patch",
-    "realise",
-    "realise_faces",
-    "realise_patches",
 ]
 
 KernelShape: TypeAlias = TopoDS_Shape
@@ -49,7 +48,7 @@ KernelShape: TypeAlias = TopoDS_Shape
 _CORNER_INDEX = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 
 
-def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
+def build_solid(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
     """Build the closed solid round a wall.
 
     Parameters
@@ -66,7 +65,7 @@ def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> T
     return _Realisation(wall).build(progress or (lambda done, total: None))
 
 
-def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
+def build_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
     """The two faces of every patch, without side walls, neighbours sharing their edges.
 
     Parameters
@@ -81,13 +80,13 @@ def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
     return _Realisation(wall).faces()
 
 
-def realise_patches(wall: Wall) -> list[list[TopoDS_Face]]:
+def build_patches(wall: Wall) -> list[list[TopoDS_Face]]:
     """All faces of every patch of a closed wall, its free side walls too, oriented outwards and sharing their edges."""
     return _Realisation(wall).patches()
 
 
 def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
-    """The faces of a solid made by :func:`realise`, by patch: side 0, side 1, then its free side walls.
+    """The faces of a solid made by :func:`build_solid`, by patch: side 0, side 1, then its free side walls.
 
     Parameters
     ----------
@@ -213,7 +212,9 @@ class _Realisation:
             for index, patch in enumerate(owner):
                 k = self.patch_edges[patch].index(index)
                 edge = TopoDS_Edge()
-                self.builder.MakeEdge(edge, self.geometry.rim(patch, k, side), self.geometry.location(patch), TOLERANCE)
+                self.builder.MakeEdge(
+                    edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE
+                )
                 start, end = fans[index]
                 self._bound(edge, self.vertices[side][start], self.vertices[side][end], -1.0, 1.0)
                 made.append(edge)

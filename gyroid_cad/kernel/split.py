@@ -43,10 +43,10 @@ __all__ = [
     "changes",
     "compound_of",
     "general_fuse",
-    "images",
     "inner_point",
     "inner_sides",
     "lies_in",
+    "modified",
     "running_like",
     "shells_of",
     "solids_of",
@@ -106,10 +106,10 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     inside = [
         piece
         for face in faces
-        for piece in images(fuse, face)
+        for piece in modified(fuse, face)
         if any(lies_in(piece, classifier, context) for classifier in classifiers)
     ]
-    pieces = [(piece, index) for index, face in enumerate(boundary) for piece in images(fuse, face)]
+    pieces = [(piece, index) for index, face in enumerate(boundary) for piece in modified(fuse, face)]
     return Pieces(
         tuple(TopoDS.Face_s(piece) for piece in inside),
         tuple(TopoDS.Face_s(piece) for piece, _ in pieces),
@@ -131,7 +131,7 @@ def bounded_solids(
         Faces that lie in the part uncut, oriented likewise.
     wanted_at : callable
         Whether a point, shape (3,), on the part's boundary belongs to the solid wanted: asked only of pieces of the
-        boundary that hang together with none that the lattice meets.
+        boundary that are connected with none that the lattice meets.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
 
 
 def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
-    """Faces in shells that hang together by edges, closed or not.
+    """Faces in shells that are connected by edges, closed or not.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def _users(faces: Sequence[TopoDS_Face]) -> list[list[_Use]]:
 
 
 def _connected(count: int, users: list[list[_Use]]) -> list[list[int]]:
-    """Faces in groups that hang together by edges."""
+    """Faces in groups that are connected by edges."""
     beside: list[set[int]] = [set() for _ in range(count)]
     for uses in users:
         for use in uses:
@@ -345,7 +345,7 @@ def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
     return fuse
 
 
-def images(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+def modified(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
     """What a shape has become in a general fuse: itself, if nothing crossed it."""
     if fuse.IsDeleted(shape):
         return []

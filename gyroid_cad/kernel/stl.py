@@ -111,7 +111,7 @@ def meshed_by_face(
         file = Path(folder) / "triangles.stl"
         _write(copy, file, path)
         records = np.fromfile(file, _RECORD, offset=_HEADER_BYTES)
-    # Minus nought is nought.
+    # Minus zero is zero.
     corners: NDArray[np.float32] = records["corners"].reshape(-1, 3) + np.float32(0)
     vertices, numbers = np.unique(corners, axis=0, return_inverse=True)
     triangles = numbers.reshape(-1, 3).astype(np.int32)

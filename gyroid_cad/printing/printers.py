@@ -31,11 +31,11 @@ class Printer:
     name, process : str
     build_volume : tuple of float
         Along its own three axes.
-    smallest_supported_wall : float
+    min_supported_wall : float
         Of walls that are joined to others on two sides or more.
-    smallest_unsupported_wall : float
+    min_unsupported_wall : float
         Of walls that stand free at an edge.
-    smallest_drain_hole : float
+    min_drain_hole : float
         Diameter.
     """
 
@@ -43,9 +43,9 @@ class Printer:
     name: str
     process: str
     build_volume: tuple[float, float, float]
-    smallest_supported_wall: float
-    smallest_unsupported_wall: float
-    smallest_drain_hole: float
+    min_supported_wall: float
+    min_unsupported_wall: float
+    min_drain_hole: float
 
 
 _KEYS = tuple(field.name for field in fields(Printer) if field.name != "key")

@@ -76,7 +76,7 @@ def facets_of_wall(wall: Wall) -> Facets:
     Examples
     --------
     >>> from gyroid_cad import Lattice
-    >>> facets = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).laid().wall)
+    >>> facets = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).fitted().wall)
     >>> facets.closed, len(np.unique(facets.faces)) - 2 * 24
     (True, 36)
     """

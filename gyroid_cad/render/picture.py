@@ -53,7 +53,7 @@ def require_view(size: tuple[int, int], camera: Vector) -> tuple[tuple[int, int]
         raise ParameterError("size", size, f"width and height in pixels, {_SMALLEST} to {_LARGEST}")
     x, y, z = three_numbers("camera", camera).tolist()
     if x == y == z == 0:
-        raise ParameterError("camera", camera, "a direction, not nought")
+        raise ParameterError("camera", camera, "a direction, not zero")
     return (width, height), (x, y, z)
 
 

@@ -20,10 +20,8 @@ from gyroid_cad.mesh.finite_elements.summaries import shown_name
 from gyroid_cad.render.drawing import draw, snug_size
 from gyroid_cad.render.facets import COLOURS, Facets
 from gyroid_cad.render.picture import VIEWS, data_uri, png
-from gyroid_cad.report.charts import histogram
-from gyroid_cad.report.labels import NOTES, TITLES, label_of
+from gyroid_cad.report.charts import NOTES, STYLE, TITLES, histogram, label_of
 from gyroid_cad.report.sections import NONE, Report
-from gyroid_cad.report.style import STYLE
 from gyroid_cad.version import __version__
 
 __all__ = ["page_of", "require_page", "write_page"]

@@ -34,7 +34,7 @@ __all__ = [
     "fit_patch",
     "fit_report",
     "fit_within",
-    "largest_offset",
+    "max_offset",
     "require_shared_edges",
 ]
 
@@ -187,7 +187,7 @@ def edge_gap(fitted: FittedPatch) -> float:
 
 
 @lru_cache(maxsize=32)
-def largest_offset(fitted: FittedPatch) -> float:
+def max_offset(fitted: FittedPatch) -> float:
     """How far the fit can be offset to both sides before it folds over, in bounding-cell lengths.
 
     The exact surface folds at its smallest radius of curvature; the fit a little before. Where it is

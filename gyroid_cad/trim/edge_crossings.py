@@ -14,7 +14,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.roots import roots
 from gyroid_cad.nurbs.surface import basis
 
-__all__ = ["AXES", "PLANES", "Faces", "Rims", "plane_heights", "rim_crossings", "square_points"]
+__all__ = ["AXES", "PLANES", "EdgeCrossings", "Faces", "edge_crossings", "plane_heights", "square_points"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -102,7 +102,7 @@ class Faces:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rims:
+class EdgeCrossings:
     """Where sides of the square cross planes, ordered by face, then side, then along the side.
 
     Attributes
@@ -142,7 +142,7 @@ def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:
     return u, v
 
 
-def rim_crossings(faces: Faces) -> Rims:
+def edge_crossings(faces: Faces) -> EdgeCrossings:
     """Where the sides of faces cross the planes near them.
 
     Raises
@@ -172,7 +172,7 @@ def rim_crossings(faces: Faces) -> Rims:
     if np.any(touching | (np.abs(along) > 1 - _TOUCHING)):
         raise KernelError("an edge of the lattice touches the box")
     order = np.lexsort((along, side, face))
-    return Rims(face[order], side[order], plane[order], along[order], (across > 0)[order])
+    return EdgeCrossings(face[order], side[order], plane[order], along[order], (across > 0)[order])
 
 
 def plane_heights(faces: Faces, face: Integers, plane: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats]:

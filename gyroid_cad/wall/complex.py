@@ -103,7 +103,7 @@ class CellComplex:
         return border
 
     @property
-    def pinch_lines(self) -> int:
+    def non_manifold_edges(self) -> int:
         """Corners at which more than one fan meets: lines through the wall where patches touch without joining."""
         return int(np.sum(np.bincount(self.fan_corner) > 1))
 

@@ -1,6 +1,6 @@
 """How large a sphere passes through a lattice's channels, from the exact surface by distance.
 
-A labyrinth's throats are where the largest sphere that can travel through it without end is held: the places with the
+A network's throats are where the largest sphere that can travel through it without end is held: the places with the
 greatest least distance from the mid-surface along a path (the pore-limiting diameter of porous media). A wall's face
 lies half the wall off the mid-surface along its normals, so the sphere's diameter falls by exactly the wall's
 thickness.
@@ -25,7 +25,7 @@ from gyroid_cad.wall.exact import patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import SIDES, Wall
 
-__all__ = ["Throats", "labyrinth_throats", "narrowest_opening", "throat_diameter"]
+__all__ = ["PoreLimits", "narrowest_opening", "network_throats", "pore_limiting_diameter"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,7 +34,7 @@ Booleans = NDArray[np.bool_]
 # Nodes along a cell. Throats lie where symmetries of the surface leave points fixed, which are eighths of the cell; and
 # the channels of all three surfaces run along edges and diagonals of the grid, along which its nodes are joined.
 _NODES = 16
-# Samples along a patch's side: of the mid-surface, and of the faces of a wall that varies.
+# Samples along a patch's side: of the mid-surface, and of the faces of a graded wall.
 _EXACT_SAMPLES, _FACE_SAMPLES = 25, 9
 # Nodes whose distances agree so closely, in cell sizes, lie equally far: symmetric ones do, to rounding.
 _EQUALLY_FAR = 1e-9
@@ -46,17 +46,17 @@ _PATCHES_AT_ONCE = 4_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Throats:
-    """The throats of a surface's two labyrinths.
+class PoreLimits:
+    """The throats of a surface's two networks.
 
     Attributes
     ----------
     centres : ndarray, shape (n, 3)
         Of one cell, in cell sizes, within [0, 1).
     above : ndarray of bool, shape (n,)
-        Whether they lie in the labyrinth that the common normal points to.
+        Whether they lie in the network that the common normal points to.
     radius : float
-        Distance from the mid-surface, in cell sizes: the less of the two labyrinths'.
+        Distance from the mid-surface, in cell sizes: the less of the two networks'.
     """
 
     centres: Floats
@@ -67,8 +67,8 @@ class Throats:
         freeze_arrays(self)
 
 
-def throat_diameter(surface: MinimalSurface, cell_size: float, thickness: float) -> float:
-    """Diameter of the largest sphere that can pass through both labyrinths beside a constant wall, in mm.
+def pore_limiting_diameter(surface: MinimalSurface, cell_size: float, thickness: float) -> float:
+    """Diameter of the largest sphere that can pass through both networks beside a constant wall, in mm.
 
     Parameters
     ----------
@@ -76,12 +76,12 @@ def throat_diameter(surface: MinimalSurface, cell_size: float, thickness: float)
     cell_size, thickness : float
         In mm.
     """
-    return 2 * labyrinth_throats(surface).radius * cell_size - thickness
+    return 2 * network_throats(surface).radius * cell_size - thickness
 
 
 @lru_cache(maxsize=8)
-def labyrinth_throats(surface: MinimalSurface) -> Throats:
-    """Where a surface's labyrinths are narrowest for what travels through them.
+def network_throats(surface: MinimalSurface) -> PoreLimits:
+    """Where a surface's networks are narrowest for what travels through them.
 
     A grid is flooded from the places furthest from the surface until the flood runs through the cell without end; the
     node that joins it is the throat, and its distance is then worked out to rounding from the exact surface.
@@ -115,11 +115,11 @@ def labyrinth_throats(surface: MinimalSurface) -> Throats:
         own = 2 * (nodes[at[0]] - middle - complex.patch_cell[patch]) @ turn
         radii.append(_least_distance(exact, own) / 2)
     every = np.concatenate(chosen)
-    return Throats(nodes[every], above[every], min(radii))
+    return PoreLimits(nodes[every], above[every], min(radii))
 
 
 def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int]) -> float:
-    """Diameter of the largest sphere about the throats' centres of a lattice that varies, in mm.
+    """Diameter of the largest sphere about the throats' centres of a graded lattice, in mm.
 
     The centres are carried along with space. Where a wall or a map is lopsided a sphere somewhat larger passes beside
     the centre: so this is on the safe side. Distances are measured to the nets' own faces.
@@ -134,7 +134,7 @@ def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int])
     -------
     float
     """
-    centres = _throats_of_block(labyrinth_throats(grading.surface).centres, cells) * grading.cell_size
+    centres = _throats_of_block(network_throats(grading.surface).centres, cells) * grading.cell_size
     images = grading.carry(centres)[0].T
     distance, patch = _to_faces(wall, images)
     least = float(distance.min())

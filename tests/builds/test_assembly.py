@@ -220,7 +220,7 @@ def varying(x: Any, y: Any, z: Any) -> Any:
     ids=["varying", "mapped", "trimmed"],
 )
 def test_cells_that_differ_or_are_cut_have_no_part_in_common(settings: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="instances = True: expected a lattice whose cells are all alike"):
+    with pytest.raises(ParameterError, match="instances = True: expected a lattice whose cells are uniform"):
         Lattice((2, 1, 1), SIZE, **settings).write(tmp_path / "none.step", instances=True)
     assert not list(tmp_path.iterdir())
 

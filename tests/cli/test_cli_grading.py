@@ -35,7 +35,15 @@ def test_options_describe_the_same_lattice_as_python_does(capsys: Captured, tmp_
     assert done.status == 0
     assert summary["valid"]
     assert summary["closed"]
-    for key in ("volume", "volume_exact", "density", "thinnest", "thickest", "control_points", "max_deviation"):
+    for key in (
+        "volume",
+        "volume_exact",
+        "density",
+        "min_thickness",
+        "max_thickness",
+        "control_points",
+        "max_deviation",
+    ):
         assert summary[key] == report[key]
 
 
@@ -50,7 +58,7 @@ def test_the_papers_units_are_those_of_lattice_paper(capsys: Captured, tmp_path:
 def test_the_table_shows_the_range_of_the_wall_and_what_the_fit_took(capsys: Captured, tmp_path: Path) -> None:
     done = run(capsys, "-o", tmp_path / "a.brep", *ONE_CELL, "--thickness", "0.6 + 0.02*x", *COARSE)
     report = Lattice((1, 1, 1), 10.0, "0.6 + 0.02*x", fit=FitSettings(6), tolerance=0.01).report()
-    assert f"{report.thinnest:.4g} to {report.thickest:.4g}" in done.out
+    assert f"{report.min_thickness:.4g} to {report.max_thickness:.4g}" in done.out
     assert f"{report.control_points} x {report.control_points} control points a patch" in done.out
     assert "289 for folding" in done.out
 

@@ -57,7 +57,11 @@ def test_a_part_may_be_several_solids() -> None:
     part = require_part(compound_of([ball(), ball(3 * RADIUS)]))
     assert len(part.solids) == 2
     assert part.volume == pytest.approx(2 * require_part(ball()).volume)
-    assert part.holds(np.array([[0.0, 0, 0], [3 * RADIUS, 0, 0], [1.5 * RADIUS, 0, 0]])).tolist() == [True, True, False]
+    assert part.contains(np.array([[0.0, 0, 0], [3 * RADIUS, 0, 0], [1.5 * RADIUS, 0, 0]])).tolist() == [
+        True,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +84,7 @@ def test_what_is_no_closed_solid_is_refused_with_what_is_wrong(shape: TopoDS_Sha
 
 def test_points_are_held_by_the_ball_that_their_distance_says() -> None:
     points = np.random.default_rng(1).uniform(-RADIUS, RADIUS, (300, 3))
-    assert np.array_equal(require_part(ball()).holds(points), np.linalg.norm(points, axis=1) < RADIUS)
+    assert np.array_equal(require_part(ball()).contains(points), np.linalg.norm(points, axis=1) < RADIUS)
 
 
 @pytest.mark.parametrize("spacing", [0.3, 2.0])

@@ -15,7 +15,6 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import cKDTree
 
-import gyroid_cad.kernel.core
 import gyroid_cad.kernel.offset
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
@@ -23,7 +22,7 @@ from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.skin import Hollow, hollow, openings_of
-from gyroid_cad.kernel.solid import realise_faces
+from gyroid_cad.kernel.solid import build_faces
 from gyroid_cad.kernel.split import bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
@@ -97,9 +96,9 @@ def filled(name: str) -> tuple[Part, Hollow, TopoDS_Shape, TopoDS_Shape]:
     complex = covering_complex(core.low, core.high, FRAME, CELL, WALL / 2)
     cloud, error = core.surface_samples(CELL / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, CELL, WALL / 2, lambda points: tree.query(points)[0] - error, core.holds)
+    sides = patch_sides(complex, FRAME, CELL, WALL / 2, lambda points: tree.query(points)[0] - error, core.contains)
     wall = build_wall(complex, fit_patch(FitSettings(6)), CELL, WALL).moved(FRAME.rotation, FRAME.origin)
-    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in realise_faces(wall)]
+    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (
         [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
     )
@@ -232,7 +231,7 @@ def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatc
     def wrong(*arguments: Any) -> Iterator[TopoDS_Shape | None]:
         yield from len(CLOSED_WAYS) * [None if given is None else wrapped(given)]
 
-    monkeypatch.setattr(gyroid_cad.kernel.core, "offsets", wrong)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", wrong)
     with pytest.raises(KernelError, match="cannot offset the part by 1 mm; without a skin it can still be filled"):
         parted(box())
 

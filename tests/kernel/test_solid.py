@@ -33,13 +33,12 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.kernel.check import enclosed_volume, topology
-from gyroid_cad.kernel.solid import TOLERANCE, another_handle, realise
+from gyroid_cad.kernel.solid import TOLERANCE, another_handle, build_solid
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.surface.patch import smooth
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import SIDES, Wall, build_wall
 
@@ -62,7 +61,7 @@ def wall_of(cells: Cells, fit: FitSettings = COARSE, placements: Placements | No
 
 @lru_cache(maxsize=32)
 def solid_of(cells: Cells, fit: FitSettings = COARSE, placements: Placements | None = None) -> TopoDS_Shape:
-    return realise(wall_of(cells, fit, placements))
+    return build_solid(wall_of(cells, fit, placements))
 
 
 @lru_cache(maxsize=1)
@@ -132,7 +131,7 @@ def test_a_patch_has_two_faces_and_a_free_edge_has_one(cells: Cells) -> None:
 
 @pytest.mark.parametrize("cells", BLOCKS)
 def test_the_shell_is_the_double_of_the_mid_surface(cells: Cells) -> None:
-    """Two copies of the mid-surface, joined along its border by annuli, whose Euler characteristic is nought."""
+    """Two copies of the mid-surface, joined along its border by annuli, whose Euler characteristic is zero."""
     complex = wall_of(cells).complex
     assert complex.border_fans.sum() == complex.free.sum()  # the border is made of closed curves
     assert euler_characteristic(solid_of(cells)) == 2 * mid_surface_euler_characteristic(wall_of(cells))
@@ -183,7 +182,7 @@ def sewn(wall: Wall) -> BRepBuilderAPI_Sewing:
 def test_sewing_the_faces_of_a_bounding_cell_gives_the_same_solid() -> None:
     placements = bounding_cell(USUAL.patch)
     wall, built = wall_of(ONE_CELL, COARSE, placements), solid_of(ONE_CELL, COARSE, placements)
-    assert wall.complex.pinch_lines == 0
+    assert wall.complex.non_manifold_edges == 0
     sewing = sewn(wall)
     assert sewing.NbFreeEdges() == 0
     solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(sewing.SewedShape())).Solid()
@@ -279,7 +278,7 @@ def test_a_line_along_the_exact_normal_passes_through_one_thickness_of_wall(
 
 def test_progress_rises_to_the_number_of_patches() -> None:
     told: list[tuple[int, int]] = []
-    realise(wall_of((2, 2, 1)), lambda done, total: told.append((done, total)))
+    build_solid(wall_of((2, 2, 1)), lambda done, total: told.append((done, total)))
     assert told == sorted(told)
     assert {total for _, total in told} == {wall_of((2, 2, 1)).complex.patch_count}
     assert told[-1][0] == told[-1][1]

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure, require_part
-from gyroid_cad.kernel.solid import realise, realise_faces
+from gyroid_cad.kernel.solid import build_faces, build_solid
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import build_complex
@@ -45,9 +45,9 @@ def filled(shape: TopoDS_Shape) -> TopoDS_Shape:
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
     cloud, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.holds)
+    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.contains)
     wall = build_wall(complex, fit_patch(COARSE), L, THICKNESS).moved(FRAME.rotation, FRAME.origin)
-    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in realise_faces(wall)]
+    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (
         [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
     )
@@ -59,7 +59,7 @@ def filled(shape: TopoDS_Shape) -> TopoDS_Shape:
 def lattice() -> TopoDS_Shape:
     """A block that covers the parts, for the kernel's own boolean."""
     wall = build_wall(build_complex((3, 3, 3), first=(-1, -1, -1)), fit_patch(COARSE), L, THICKNESS)
-    return realise(wall.moved(FRAME.rotation, FRAME.origin))
+    return build_solid(wall.moved(FRAME.rotation, FRAME.origin))
 
 
 @pytest.mark.parametrize(

@@ -165,7 +165,7 @@ def test_a_closed_surface_looks_the_same_with_or_without_its_back() -> None:
 
 
 def test_a_lattice_looks_the_same_with_or_without_the_backs_of_its_faces() -> None:
-    front = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).laid().wall)
+    front = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).fitted().wall)
     pictures = [draw(facets, (150, 150)).astype(int) for facets in (front, seen_from_both_sides(front))]
     # Along outlines and edges rounding may choose another triangle.
     assert np.mean(np.abs(pictures[0] - pictures[1]).max(axis=-1) > 8) < 0.01
@@ -203,7 +203,7 @@ def shares(image: Bytes) -> list[float]:
 
 def test_both_sides_of_a_wall_have_their_colours_whether_the_kernel_made_the_solid_or_not() -> None:
     lattice = Lattice((2, 2, 2), 10, 0.8, fit=FitSettings(5))
-    wall = shares(draw(facets_of_wall(lattice.laid().wall), (200, 200)))
+    wall = shares(draw(facets_of_wall(lattice.fitted().wall), (200, 200)))
     solid = shares(draw(facets_of_shape(lattice.solid()), (200, 200)))
     assert min(wall) > 0.1
     assert solid == pytest.approx(wall, abs=0.02)

@@ -57,6 +57,6 @@ def test_a_camera_without_a_direction_is_refused(camera: object) -> None:
 
 def test_more_cells_than_a_picture_shows_are_refused_before_any_is_laid(monkeypatch: pytest.MonkeyPatch) -> None:
     most = MOST_DRAWN_PATCHES // 24
-    monkeypatch.setattr(Lattice, "laid", lambda self: pytest.fail("laid"))
+    monkeypatch.setattr(Lattice, "fitted", lambda self: pytest.fail("fitted"))
     with pytest.raises(ParameterError, match=f"at most {most} cells"):
         Lattice((most + 1, 1, 1), 10, 0.8).picture()

@@ -132,7 +132,12 @@ def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytes
     monkeypatch.setitem(
         LATTICE_SECTIONS,
         "print_check",
-        lambda subject: {"printer": "resin", "fits": True, "walls": [{"thinnest": 0.5, "fine": False}], "layers": 3},
+        lambda subject: {
+            "printer": "resin",
+            "fits": True,
+            "walls": [{"min_thickness": 0.5, "fine": False}],
+            "layers": 3,
+        },
     )
     for name in ("measures", "wall", "pores", "fit", "quality"):
         monkeypatch.delitem(LATTICE_SECTIONS, name)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, ElementType, element_type
-from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_places, place_count
+from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.offset import Wall
@@ -201,7 +201,7 @@ def _meshed(wall: Wall, subdivisions: int, layers: int, element: ElementType) ->
     steps = element.order * subdivisions
     across = np.linspace(0, 1, element.order * layers + 1) if layers else np.array([0.5])
     points = _nodes(wall, steps, across)
-    cells = _cells(patch_places(wall.complex, steps), len(across), element)
+    cells = _cells(patch_nodes(wall.complex, steps), len(across), element)
     kept = None
     if element.sparse:
         kept, numbers = np.unique(cells, return_inverse=True)
@@ -242,7 +242,7 @@ def _nodes(wall: Wall, steps: int, levels: Floats) -> Floats:
         # Axis by axis: loops of three would be too short.
         for axis in range(3):
             np.add(within[..., axis], shifts[..., axis], out=inside[some][..., axis])
-        points[patch_places(wall.complex, steps, some).reshape(len(nets), -1)[:, border]] = around + shifts
+        points[patch_nodes(wall.complex, steps, some).reshape(len(nets), -1)[:, border]] = around + shifts
     return points.reshape(-1, 3)
 
 

@@ -68,7 +68,7 @@ def face_groups(triangulation: Triangulation) -> Iterator[FaceGroup]:
 
 
 def side_groups(triangulation: Triangulation) -> Iterator[tuple[Template, Integers]]:
-    """All free edges by their steps, with the template of their side walls."""
+    """All boundary edges by their steps, with the template of their side walls."""
     free = np.flatnonzero(triangulation.wall.complex.free)
     steps = triangulation.edge_steps[free]
     for along in np.unique(steps).tolist():
@@ -76,7 +76,7 @@ def side_groups(triangulation: Triangulation) -> Iterator[tuple[Template, Intege
 
 
 class Corners:
-    """Where the corners of a triangulation are, in mm, in single precision: x, y, z and a nought.
+    """Where the corners of a triangulation are, in mm, in single precision: x, y, z and a zero.
 
     For what is gathered of them: sixteen bytes at a time go four times as quick as twelve.
 
@@ -239,7 +239,7 @@ class _Numbers:
         self._on_edges = complex.fan_count + _starts(between)
         self._inside = complex.fan_count + int(between.sum()) + _starts(inside)
         self._face = complex.fan_count + int(between.sum() + inside.sum())
-        # Through the wall: at every fan on the border, then along every free edge.
+        # Through the wall: at every fan on the border, then along every boundary edge.
         within = self._across - 1
         border = complex.border_fans
         self._at_fans = 2 * self._face + _starts(border * within)
@@ -280,7 +280,7 @@ class _Numbers:
 
 
 def _four_wide(places: Floats) -> Singles:
-    """In single precision, with a nought behind."""
+    """In single precision, with a zero behind."""
     wide = np.zeros((*places.shape[:-1], 4), dtype=np.float32)
     wide[..., :3] = places
     return wide

@@ -83,13 +83,13 @@ def face_deviations(wall: Wall, cases: Integers) -> Floats:
 def side_deviations(
     wall: Wall, free: Integers, steps: Integers, template: Callable[[int], Template]
 ) -> tuple[Floats, Integers]:
-    """The same of distinct side walls with distinct steps along them, and which of them each free edge has.
+    """The same of distinct side walls with distinct steps along them, and which of them each boundary edge has.
 
     Parameters
     ----------
     wall : Wall
-    free : ndarray of int, shape (free edges,)
-    steps : ndarray of int, shape (free edges,)
+    free : ndarray of int, shape (boundary edges,)
+    steps : ndarray of int, shape (boundary edges,)
     template : callable
         From the steps along a side wall to its triangles.
     """
@@ -132,7 +132,7 @@ def _by_template(cases: Integers) -> Iterator[tuple[Template, Integers]]:
 
 
 def _side_cases(wall: Wall, free: Integers, steps: Integers) -> tuple[Integers, Integers]:
-    """Distinct pairs of steps and canonical edge, and which of them each free edge has."""
+    """Distinct pairs of steps and canonical edge, and which of them each boundary edge has."""
     keys, which = np.unique(np.column_stack([steps, canonical_edges(wall, free)[1]]), axis=0, return_inverse=True)
     return keys, which.ravel()
 

@@ -1,4 +1,4 @@
-"""Shells of a triangulated surface: which triangles hang together, which shells bound voids, and what is open.
+"""Shells of a triangulated surface: which triangles are connected, which shells bound voids, and what is open.
 
 A shell is what is connected by edges. Oriented outwards, one that bounds solid encloses a positive volume, and one
 that bounds a void within it a negative one.
@@ -76,7 +76,7 @@ def shells_of(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) ->
     Parameters
     ----------
     vertices : ndarray, shape (vertices, 3)
-        In mm; no two alike, for triangles hang together by their vertices' numbers.
+        In mm; no two alike, for triangles are connected by their vertices' numbers.
     triangles : ndarray of int, shape (triangles, 3)
         Counterclockwise seen from outside.
 
@@ -101,7 +101,7 @@ def shells_of(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) ->
 
 
 def _connected(triangles: Integers, count: int) -> tuple[Integers, int]:
-    """Labels of what hangs together by edges, shape (triangles,); and how many edges are open."""
+    """Labels of what is connected by edges, shape (triangles,); and how many edges are open."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

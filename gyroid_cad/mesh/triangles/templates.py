@@ -170,13 +170,13 @@ def _grid_triangles(numbers: Integers) -> Integers:
     return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
-def _stitched(outer: Integers, rim: Integers, outer_at: Floats, rim_at: Floats) -> Integers:
+def _stitched(outer: Integers, rim: Integers, outer_at: Floats, inner_at: Floats) -> Integers:
     """Triangles between an edge and the rim inside it that runs the same way, the rim to its left."""
     triangles = []
     i = j = 0
     while i < len(outer) - 1 or j < len(rim) - 1:
-        to_outer = abs(outer_at[i + 1] - rim_at[j]) if i < len(outer) - 1 else np.inf
-        to_rim = abs(outer_at[i] - rim_at[j + 1]) if j < len(rim) - 1 else np.inf
+        to_outer = abs(outer_at[i + 1] - inner_at[j]) if i < len(outer) - 1 else np.inf
+        to_rim = abs(outer_at[i] - inner_at[j + 1]) if j < len(rim) - 1 else np.inf
         if to_outer <= to_rim:
             triangles.append((outer[i], outer[i + 1], rim[j]))
             i += 1

@@ -47,7 +47,7 @@ class FaceGroup:
 
     @property
     def triangles(self) -> Integers:
-        """Triangles of both faces, oriented outwards, in the corners of face 0, then of face 1; shape (triangles, 3)."""
+        """Triangles of both faces, oriented outwards, in the corners of face 0, then 1; shape (triangles, 3)."""
         below, above = self.template.triangles[:, ::-1], self.template.triangles + len(self.template.places)
         return np.concatenate([below, above])
 

@@ -1,4 +1,4 @@
-"""What a lattice turned out to be, as plain values."""
+"""Report on a lattice's solid, as plain values."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gyroid_cad.builds.solid import Build
-from gyroid_cad.surface.fit import fit_patch, fit_report
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 
 __all__ = ["LatticeReport", "report_of"]
 
 
 @dataclass(frozen=True, slots=True)
 class LatticeReport:
-    """What was built, and how exactly.
+    """Report on a built lattice: its size, its faces, and how exact they are.
 
     Attributes
     ----------

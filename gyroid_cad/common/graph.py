@@ -48,7 +48,7 @@ def connected(count: int, first: Integers, second: Integers) -> Integers:
 
 
 def runs_on(count: int, first: Integers, second: Integers, cells: Integers) -> bool:
-    """Whether some component of a graph that repeats in all directions leads from a node to its image elsewhere.
+    """Tell whether some component of a graph that repeats in all directions leads from a node to its image elsewhere.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How large a sphere passes through a lattice's channels, from the exact surface by distance.
+"""Pore limiting diameters: the largest spheres that pass through a lattice's channels.
 
 A network's throats are where the largest sphere that can travel through it without end is held: the places with the
 greatest least distance from the mid-surface along a path (the pore-limiting diameter of porous media). A wall's face
@@ -84,7 +84,7 @@ def pore_limiting_diameter(surface: MinimalSurface, cell_size: float, thickness:
 
 @lru_cache(maxsize=8)
 def network_throats(surface: MinimalSurface) -> PoreLimits:
-    """Where a surface's networks are narrowest for what travels through them.
+    """Throats of a surface's networks, where they are narrowest for what travels through them.
 
     A grid is flooded from the places furthest from the surface until the flood runs through the cell without end; the
     node that joins it is the throat, and its distance is then worked out to rounding from the exact surface.
@@ -213,7 +213,7 @@ def _held(distance: Floats) -> float:
 
 
 def _endless(filled: Booleans) -> bool:
-    """Whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images elsewhere."""
+    """Tell whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images."""
     number = np.flatnonzero(filled)
     at = np.stack(np.unravel_index(number, filled.shape), axis=1)
     first, second, cells = [], [], []

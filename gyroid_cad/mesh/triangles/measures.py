@@ -26,7 +26,7 @@ _SPHERE = 4 * np.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleMeasures:
-    """What triangles amount to, shell by shell.
+    """Measures of a mesh of triangles, shell by shell.
 
     A shell is what is connected by edges. Oriented outwards, one that bounds solid encloses a positive volume, and one
     that bounds a void within it a negative one.
@@ -64,7 +64,7 @@ class TriangleMeasures:
 
     @property
     def closed(self) -> bool:
-        """Whether every edge is used as often one way as the other: then there is an inside."""
+        """Tell whether every edge is used as often one way as the other: then there is an inside."""
         return self.open_edges == 0
 
     @property
@@ -138,7 +138,7 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
 
 
 def _inside_another(points: Floats, triangles: Integers, labels: Integers, shell: int) -> bool:
-    """Whether another shell goes round one: by the winding number of the others about a point of it.
+    """Tell whether another shell goes round one: by the winding number of the others about a point of it.
 
     Solid angles of triangles as of van Oosterom and Strackee (IEEE Trans. Biomed. Eng. 30, 1983).
     """
@@ -204,7 +204,7 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
 
 
 def _locator(points: Floats, triangles: NDArray[np.int64]) -> Any:
-    """What finds the triangles that a line meets."""
+    """Locator of the triangles that a line meets."""
     core, model, support = _vtk("vtkCommonCore"), _vtk("vtkCommonDataModel"), _vtk("util.numpy_support")
     data, nodes, cells = model.vtkPolyData(), core.vtkPoints(), model.vtkCellArray()
     ends = np.arange(0, triangles.size + 1, 3)

@@ -30,8 +30,9 @@ from gyroid_cad.nurbs.surface import basis
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex
-from gyroid_cad.wall.fitted import fit_spec
+from gyroid_cad.wall.fitted import LatticeSpec, fit_spec
 from gyroid_cad.wall.offset import SIDES, Wall
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 from gyroid_cad.wall.refit import graded_wall
 
 __all__ = ["main"]
@@ -126,7 +127,7 @@ def _wrapped(places: Floats) -> Floats:
 
 def _built(lattice: Lattice) -> Build:
     """Anew, whatever was built before."""
-    return Build(fit_spec(lattice.fitted().spec), None)
+    return Build(fit_spec(LatticeSpec(lattice.cells, lattice.grading(), lattice.fit, USUAL_TOLERANCE)), None)
 
 
 def _figures(subject: _Subject, built: Build) -> tuple[str, ...]:

@@ -3,48 +3,29 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Iterable
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
-
-from numpy.typing import ArrayLike
+from typing import TYPE_CHECKING
 
 from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
 from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
-from gyroid_cad.common.checks import finite_number, positive_number
+from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.fields.makers import paper_units
-from gyroid_cad.maps.block import as_map, space_over
-from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
 from gyroid_cad.mesh.iga.patches import VolumePatches
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
-from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
-from gyroid_cad.surface.fit import FitSettings, fit_within
-from gyroid_cad.wall.complex import build_complex
-from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
-from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.limits import (
-    require_cell_size,
-    require_density,
-    require_one,
-    require_thickness,
-    valid_tolerance,
-    whole_cells,
-)
+from gyroid_cad.wall.fitted import FittedWall, fitted_wall
 from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.parameters import LatticeParameters, MapLike
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
@@ -52,21 +33,12 @@ if TYPE_CHECKING:
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
 
 Corner = tuple[float, float, float]
-MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
-# Of a graded lattice, in cell sizes.
-USUAL_TOLERANCE = 1e-4
-BOX = "box"
 _LENGTH = "a length in mm, a finite number"
-_FIELDS = {
-    "thickness": "a length in mm",
-    "density": "a volume fraction",
-    "scale_field": "a factor without unit",
-}
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice:
+class Lattice(LatticeParameters):
     """A block of cells of the gyroid or another surface: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches
@@ -107,116 +79,6 @@ class Lattice:
     ParameterError
         Naming the parameter, its value and what is accepted.
     """
-
-    cells: tuple[int, int, int]
-    cell_size: float
-    thickness: FieldLike | None = None
-    density: FieldLike | None = None
-    fit: FitSettings = field(default_factory=FitSettings)
-    scale_field: FieldLike | None = None
-    map: MapLike | None = None
-    tolerance: float | None = None
-    trim: str | None = None
-    surface: str = USUAL.name
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", whole_cells(self.cells))
-        object.__setattr__(
-            self, "cell_size", finite_number("cell_size", self.cell_size, "a length in mm, a finite number")
-        )
-        require_cell_size(self.cell_size)
-        require_one(self.thickness, self.density)
-        for name, meaning in _FIELDS.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
-        if self.map is not None:
-            object.__setattr__(self, "map", as_map(self.map))
-        surface_named(self.surface)
-        self._require_fit()
-        self._require_trim()
-        if not self.uniform:
-            self._require_variable()
-        elif self.density is None:
-            require_thickness(self.wall_thickness, self.cell_size, self.minimal_surface.tube)
-        else:
-            require_density(self.volume_fraction, self.cell_size, self.minimal_surface.tube)
-
-    @classmethod
-    def paper(
-        cls,
-        cells: tuple[int, int, int],
-        thickness_factor: FieldLike,
-        bc_length: FieldLike = 1.0,
-        scale: float = 1.0,
-        fit: FitSettings | None = None,
-        tolerance: float | None = None,
-        surface: str = USUAL.name,
-    ) -> Self:
-        """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
-
-        Parameters
-        ----------
-        cells : tuple of int
-            Number of cubic cells along x, y, z; each is two bounding cells long.
-        thickness_factor : number or field
-            Whole wall in BC units, of places in BC units before they are moved.
-        bc_length : number or field
-            In BC units: a place p is moved to bc_length(p) p.
-        scale : float
-            Millimetres per unit of BC length.
-        fit, tolerance, surface
-            As of :class:`Lattice`.
-
-        Raises
-        ------
-        ParameterError
-        """
-        given = paper_units(thickness_factor, bc_length, scale)
-        return cls(
-            cells,
-            given.cell_size,
-            given.thickness,
-            fit=fit or FitSettings(),
-            scale_field=given.scale_field,
-            tolerance=tolerance,
-            surface=surface,
-        )
-
-    @property
-    def minimal_surface(self) -> MinimalSurface:
-        """The surface of that name, from the table of families."""
-        return surface_named(self.surface)
-
-    @property
-    def uniform(self) -> bool:
-        """Whether every cell is like every other."""
-        varying = isinstance(self.thickness, Field) or isinstance(self.density, Field)
-        return not varying and self.scale_field is None and self.map is None
-
-    @property
-    def wall_thickness(self) -> float:
-        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice is graded."""
-        if not self.uniform:
-            return self._measures().mean_thickness
-        if self.density is None:
-            return float(self.thickness)  # type: ignore[arg-type]
-        return self.minimal_surface.tube.thickness(self.density) * self.cell_size  # type: ignore[arg-type]
-
-    @property
-    def volume_fraction(self) -> float:
-        """The density, whichever of thickness and density was given; the whole block's where the lattice is graded."""
-        if not self.uniform:
-            return self.exact_volume / block_volume(self.cells, self._grading())
-        if self.density is None:
-            return self.minimal_surface.tube.density(self.wall_thickness / self.cell_size)
-        return float(self.density)  # type: ignore[arg-type]
-
-    @property
-    def exact_volume(self) -> float:
-        """Volume in mm3 of the exact lattice, by the tube formula, or by quadrature where it varies."""
-        if not self.uniform:
-            return self._measures().volume
-        return prod(self.cells) * self.volume_fraction * self.cell_size**3
 
     def wall(self) -> Wall:
         """Control nets of the wall's faces, in mm, and the cell complex they belong to.
@@ -339,7 +201,7 @@ class Lattice:
         FitError, KernelError
             As of :meth:`solid`.
         """
-        return assembly(self._spec(), progress)
+        return assembly(self.spec(), progress)
 
     def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
         """Make the assembly if it isn't yet, and say what it is; nothing is written."""
@@ -376,7 +238,7 @@ class Lattice:
             require_meshing(deviation)
         # The wall first, so that its progress is told.
         self.fitted(progress)
-        return triangles(self._spec(), self._deviation(deviation), progress)
+        return triangles(self.spec(), self._deviation(deviation), progress)
 
     def triangle_report(self, deviation: float | None = None, progress: Progress | None = None) -> TriangleReport:
         """Make the triangles if they aren't yet, and say what they are; nothing is written."""
@@ -487,69 +349,12 @@ class Lattice:
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files."""
-        return build(self._spec(), progress)
+        return build(self.spec(), progress)
 
     def fitted(self, progress: Progress | None = None) -> FittedWall:
         """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""
-        return fitted_wall(self._spec(), progress)
+        return fitted_wall(self.spec(), progress)
 
     def _deviation(self, given: float | None) -> float:
         """Of triangles, in mm; the usual one if none is given."""
         return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given
-
-    def _spec(self) -> LatticeSpec:
-        settings = self.fit
-        if self.uniform and self.tolerance is not None:
-            settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
-        tolerance = self.tolerance or USUAL_TOLERANCE
-        return LatticeSpec(self.cells, self._grading(), settings, tolerance, self.trim == BOX)
-
-    def _grading(self) -> Grading:
-        if self.uniform:
-            return Grading(self.cell_size, self.wall_thickness, surface=self.minimal_surface)
-        space = None if self.map is None else space_over(self.map, self.cells, self.cell_size)  # type: ignore[arg-type]
-        return Grading(
-            self.cell_size,
-            self.thickness,  # type: ignore[arg-type]
-            self.density,  # type: ignore[arg-type]
-            self.scale_field,  # type: ignore[arg-type]
-            space,
-            self.minimal_surface,
-        )
-
-    def _measures(self) -> ExactMeasures:
-        return _measures(self.cells, self._grading())
-
-    def _require_variable(self) -> None:
-        """What can be told of a graded lattice before it is built."""
-        for name in ("thickness", "scale_field"):
-            if isinstance(value := getattr(self, name), float):
-                positive_number(name, value)
-        if isinstance(self.density, float):
-            require_density(self.density, self.cell_size, self.minimal_surface.tube)
-        if self.scale_field is not None and any(self._grading().map_closes):
-            raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
-
-    def _require_trim(self) -> None:
-        if self.trim not in (None, BOX):
-            raise ParameterError("trim", self.trim, f"{BOX}, or none for whole patches")
-        if self.trim and (self.scale_field is not None or self.map is not None):
-            raise ParameterError("trim", self.trim, "none where a map or a scale field carries the block elsewhere")
-
-    def _require_fit(self) -> None:
-        if not isinstance(self.fit, FitSettings):
-            raise ParameterError("fit", self.fit, "a FitSettings")
-        if not self.uniform and not self.fit.plain:
-            raise ParameterError(
-                "fit",
-                self.fit,
-                "evenly spaced knots, equal weights and the smooth parameterisation where the lattice is graded: "
-                "there the number of control points rises with the tolerance",
-            )
-        if self.tolerance is not None:
-            object.__setattr__(self, "tolerance", valid_tolerance(self.tolerance))
-
-
-@lru_cache(maxsize=16)
-def _measures(cells: tuple[int, int, int], grading: Grading) -> ExactMeasures:
-    return exact_measures(build_complex(cells, grading.surface.cell, grading.closed), grading)

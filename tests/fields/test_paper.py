@@ -53,12 +53,12 @@ def values(field: float | Field | None, points: Floats) -> Floats:
 def parts(name: str, cells: Cells | None = None, scale: float = 1.0) -> tuple[Lattice, CellComplex, Any]:
     printed, thickness, length = SPECIMENS[name]
     lattice = Lattice.paper(cells or printed, thickness, length, scale)
-    return lattice, build_complex(lattice.cells), lattice._grading()
+    return lattice, build_complex(lattice.cells), lattice.grading()
 
 
 def nets(lattice: Lattice, control_points: int = 6) -> Floats:
     complex = build_complex(lattice.cells)
-    return fitted_nets(complex, lattice._grading(), control_points, np.arange(complex.patch_count))
+    return fitted_nets(complex, lattice.grading(), control_points, np.arange(complex.patch_count))
 
 
 @given(SCALES, st.floats(0.01, 0.3), LENGTHS)
@@ -120,7 +120,7 @@ def test_a_callable_and_a_field_do_as_well_as_a_formula() -> None:
 def test_lattices_of_the_same_formulas_are_equal() -> None:
     one, two = (Lattice.paper((1, 1, 1), THICKNESS, LENGTH, 2.0) for _ in range(2))
     assert one == two
-    assert hash(one._grading()) == hash(two._grading())
+    assert hash(one.grading()) == hash(two.grading())
     assert one != Lattice.paper((1, 1, 1), THICKNESS, LENGTH, 3.0)
 
 
@@ -181,7 +181,7 @@ def test_the_first_specimen_comes_to_two_thirds_of_its_limit_at_its_far_corner()
     centres = placed_corners(complex.placements).mean(axis=1)[complex.patch_placement] / CELL_QUARTERS
     x, y, _ = BC_PER_CELL * (centres + complex.patch_cell).T
     max_thickness = int(np.argmax(thickness_of(x, y)))
-    doubled = Lattice.paper((3, 3, 1), f"2*({THICKNESS})")._grading()
+    doubled = Lattice.paper((3, 3, 1), f"2*({THICKNESS})").grading()
     with pytest.raises(SelfIntersectionError) as caught:
         require_simple(complex, doubled)
     limit, place = caught.value.limit, caught.value.place

@@ -19,8 +19,7 @@ from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.space import SpaceMap
 from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, uniform_knots
-from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.surface.fit_settings import MOST_CONTROL_POINTS
+from gyroid_cad.surface.fit import MOST_CONTROL_POINTS, FitSettings, fit_patch
 from gyroid_cad.wall import refit as refit_module
 from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.exact import offset_patches
@@ -44,7 +43,7 @@ def field(text: str) -> Field:
     return made
 
 
-PAPER = Lattice.paper((1, 1, 1), "0.08 + 0.05*x + 0.02*y", "1 + 0.05*x + 0.08*y")._grading()
+PAPER = Lattice.paper((1, 1, 1), "0.08 + 0.05*x + 0.02*y", "1 + 0.05*x + 0.08*y").grading()
 GRADINGS = {
     "slope": Grading(L, field("0.8 + 0.03*x")),
     "density": Grading(L, density=field("0.2 + 0.01*y"), map=Twist(30).over(SIZE)),
@@ -233,7 +232,7 @@ def test_control_points_rise_for_all_patches_alike_until_the_tolerance_is_met() 
     counts = []
     for tolerance in (1e-3, 1e-5, 1e-6):
         lattice = Lattice((1, 1, 1), L, 0.8, map="cylinder:radius=8", tolerance=tolerance, fit=FitSettings(5))
-        wall, grading = lattice.wall(), lattice._grading()
+        wall, grading = lattice.wall(), lattice.grading()
         n = len(wall.weights)
         assert wall.nets.shape == (24, 2, n, n, 3)
         made = measured(wall.nets, CELL, grading)

@@ -12,6 +12,7 @@ import click
 from gyroid_cad.cli.console import print_fill, shown_progress
 from gyroid_cad.cli.lattice_options import chosen_surface, surface_option
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 __all__ = ["fill_command"]
 
@@ -24,7 +25,7 @@ __all__ = ["fill_command"]
     multiple=True,
     required=True,
     metavar="FILE",
-    help=".step, .stp, .brep, .stl or .3mf; may be repeated.",
+    help=f"{listed_endings(PART_FORMATS)}; may be repeated.",
 )
 @surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gyroid_cad.cli.messages import label, remember_config
+from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ __all__ = [
     "surface_option",
 ]
 
-_CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
@@ -37,7 +37,7 @@ _WRITTEN, _READ = ("output", "histogram", "screenshot"), ("printer",)
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
     """Put a file's values in the place of defaults, so that options on the command line override them."""
-    if path is not None and path.lower().endswith(_CONFIG_ENDING):
+    if path is not None and format_of(path) is TOML:
         from gyroid_cad.cli.config import read_config
 
         options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
@@ -59,7 +59,7 @@ def _default(context: click.Context, config: Config, key: str, multiple: bool) -
         if key in _WRITTEN:
             parts = [config.output(key, part, context.params["allow_outside"]) for part in parts]
         elif key in _READ:
-            parts = [config.beside(part) if part.lower().endswith(_CONFIG_ENDING) else part for part in parts]
+            parts = [config.beside(part) if format_of(part) is TOML else part for part in parts]
         return parts if multiple or not isinstance(given, str) else parts[0]
 
     return value
@@ -194,10 +194,8 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     """
     from gyroid_cad.lattice import Lattice
 
-    if given["config"] is not None and not given["config"].lower().endswith(_CONFIG_ENDING):
-        raise click.UsageError(
-            f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in {_CONFIG_ENDING}."
-        )
+    if given["config"] is not None and format_of(given["config"]) is not TOML:
+        raise click.UsageError(f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in .toml.")
     fit = _fit_settings(given["fit"], given["control_points"])
     _require_given(given, "cells")
     surface = chosen_surface(given["surface"])

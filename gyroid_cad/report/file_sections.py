@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS
+from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, require_format
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
-__all__ = ["FileContents", "file_section", "is_report_file", "read_contents"]
+__all__ = ["FileContents", "file_section", "read_contents"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,6 @@ class FileContents:
     triangles: Any = None
 
 
-def is_report_file(path: str) -> bool:
-    """Tell whether a path's ending is one of a file that can be reported on."""
-    return Path(path).suffix.lower() in FORMATS
-
-
 def read_contents(path: str) -> FileContents:
     """Read a file and measure what it holds.
 
@@ -55,18 +50,16 @@ def read_contents(path: str) -> FileContents:
     ExportError
         If it cannot be read.
     """
-    target = Path(path)
-    if not is_report_file(path):
-        raise ParameterError("input file", path, f"a file name ending in {', '.join(FORMATS)}")
+    target, form = Path(path), require_format("input file", path, PART_FORMATS)
     if not target.is_file():
         raise ParameterError("input file", path, "a file that exists")
-    return _triangles_of(target) if FORMATS[target.suffix.lower()] in TRIANGLE_FORMATS else _shape_of(target)
+    return _triangles_of(target) if form in TRIANGLE_FORMATS else _shape_of(target)
 
 
 def file_section(contents: FileContents) -> dict[str, Any]:
     """Section on the contents of a file."""
     return {
-        "format": FORMATS[contents.path.suffix.lower()].upper(),
+        "format": require_format("input file", contents.path, PART_FORMATS).name,
         "bytes": contents.path.stat().st_size,
         **contents.measures,
     }

@@ -107,5 +107,6 @@ class ExportError(GyroidError, OSError):
 def _shown(value: object) -> str:
     try:
         return repr(value)
-    except ValueError:  # a whole number of more digits than Python prints
+    # A whole number of more digits than Python prints, or lists within lists within lists.
+    except (ValueError, RecursionError):
         return f"a {type(value).__name__} too long to print"

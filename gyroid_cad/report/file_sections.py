@@ -10,8 +10,7 @@ import numpy as np
 
 from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.render.drawing import Facets
-from gyroid_cad.render.facets import facets_of_triangles
+from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
 __all__ = ["FileContents", "file_section", "is_report_file", "read_contents"]
 
@@ -73,7 +72,7 @@ def file_section(contents: FileContents) -> dict[str, Any]:
 
 
 def _shape_of(path: Path) -> FileContents:
-    from gyroid_cad.kernel.reading import described, read_shape, shown_triangles
+    from gyroid_cad.kernel.reading import described, read_shape
 
     shape = read_shape(path)
     found = described(shape)
@@ -86,9 +85,7 @@ def _shape_of(path: Path) -> FileContents:
         "valid": found.valid,
         **_sizes(found.low, found.high, found.volume if found.topology.closed else None, found.area),
     }
-    facets = None
-    if found.topology.faces and extent.max() > 0:
-        facets = facets_of_triangles(*shown_triangles(shape, float(extent.max())), closed=found.topology.closed)
+    facets = facets_of_shape(shape) if found.topology.faces and extent.max() > 0 else None
     return FileContents(path, measures, facets, shape=shape)
 
 

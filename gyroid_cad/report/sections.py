@@ -20,12 +20,12 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.printing.print_check import PrintCheck, print_check
 from gyroid_cad.printing.printers import printer_named
-from gyroid_cad.render.drawing import Facets
-from gyroid_cad.render.facets import facets_of_triangles, facets_of_wall
+from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_wall
 from gyroid_cad.report.file_sections import FileContents, file_section, read_contents
 from gyroid_cad.report.pores import ChannelSpheres, pores_of
 from gyroid_cad.report.wall_thickness import exact_areas, fitted_areas, wall_thickness
-from gyroid_cad.surface.fit import fit_patch, fit_report
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -181,10 +181,7 @@ def require_subdivisions(subdivisions: int) -> int:
 def _facets(lattice: Lattice) -> Facets:
     if lattice.trim is None:
         return facets_of_wall(lattice.fitted().wall)
-    from gyroid_cad.kernel.reading import shown_triangles
-
-    extent = max(lattice.cells) * lattice.cell_size
-    return facets_of_triangles(*shown_triangles(lattice.built().solid(), extent), closed=True)
+    return facets_of_shape(lattice.built().solid())
 
 
 def parameters_section(subject: Subject) -> Values:

@@ -55,7 +55,7 @@ class NamedFace:
 
 @dataclass(frozen=True, slots=True)
 class NamedPart:
-    """What an assembly has many of.
+    """A part that an assembly has many of.
 
     Attributes
     ----------

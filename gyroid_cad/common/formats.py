@@ -7,13 +7,14 @@ is loaded when it is needed, and stands with what it writes.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 
+from gyroid_cad.common.choices import SCHEMAS, Schema
 from gyroid_cad.common.files import require_distinct, require_writable
 from gyroid_cad.errors import ParameterError
 
@@ -34,7 +35,6 @@ __all__ = [
     "NPZ",
     "PART_FORMATS",
     "PNG",
-    "SCHEMAS",
     "STEP",
     "STL",
     "THREE_MF",
@@ -107,7 +107,7 @@ PART_FORMATS = tuple(form for form in FORMATS if form.holds in ("solid", "triang
 _OF_ENDING = MappingProxyType({ending: form for form in FORMATS for ending in form.endings})
 
 # By the names of the kernel's STEP writer.
-SCHEMAS = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
+_KERNEL_SCHEMAS: Mapping[Schema, str] = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
 # Degrees between neighbouring facets.
 DEFAULT_ANGLE = 15.0
 
@@ -200,16 +200,16 @@ def require_output(path: str | os.PathLike[str], formats: Sequence[Format], opti
     return require_writable(path)
 
 
-def require_schema(schema: str) -> str:
+def require_schema(schema: Schema) -> str:
     """The kernel's name of a schema.
 
     Raises
     ------
     ParameterError
     """
-    if schema not in tuple(SCHEMAS):
+    if schema not in SCHEMAS:
         raise ParameterError("schema", schema, " or ".join(SCHEMAS))
-    return SCHEMAS[schema]
+    return _KERNEL_SCHEMAS[schema]
 
 
 def require_meshing(deviation: float, angle: float = DEFAULT_ANGLE) -> None:

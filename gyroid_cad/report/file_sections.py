@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, require_format
+from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, Format, require_format
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
@@ -23,6 +23,7 @@ class FileContents:
     Attributes
     ----------
     path : Path
+    form : Format
     measures : dict
         Plain values.
     facets : Facets, optional
@@ -34,6 +35,7 @@ class FileContents:
     """
 
     path: Path
+    form: Format
     measures: dict[str, Any]
     facets: Facets | None
     shape: Any = None
@@ -53,19 +55,19 @@ def read_contents(path: str) -> FileContents:
     target, form = Path(path), require_format("input file", path, PART_FORMATS)
     if not target.is_file():
         raise ParameterError("input file", path, "a file that exists")
-    return _triangles_of(target) if form in TRIANGLE_FORMATS else _shape_of(target)
+    return _triangles_of(target, form) if form in TRIANGLE_FORMATS else _shape_of(target, form)
 
 
 def file_section(contents: FileContents) -> dict[str, Any]:
     """Section on the contents of a file."""
     return {
-        "format": require_format("input file", contents.path, PART_FORMATS).name,
+        "format": contents.form.name,
         "bytes": contents.path.stat().st_size,
         **contents.measures,
     }
 
 
-def _shape_of(path: Path) -> FileContents:
+def _shape_of(path: Path, form: Format) -> FileContents:
     from gyroid_cad.kernel.reading import described, read_shape
 
     shape = read_shape(path)
@@ -80,10 +82,10 @@ def _shape_of(path: Path) -> FileContents:
         **_sizes(found.low, found.high, found.volume if found.topology.closed else None, found.area),
     }
     facets = facets_of_shape(shape) if found.topology.faces and extent.max() > 0 else None
-    return FileContents(path, measures, facets, shape=shape)
+    return FileContents(path, form, measures, facets, shape=shape)
 
 
-def _triangles_of(path: Path) -> FileContents:
+def _triangles_of(path: Path, form: Format) -> FileContents:
     from gyroid_cad.mesh.triangles.files import read_triangles
     from gyroid_cad.mesh.triangles.measures import triangle_measures
 
@@ -100,7 +102,7 @@ def _triangles_of(path: Path) -> FileContents:
     }
     flat = found.area == 0
     facets = None if flat else facets_of_triangles(vertices, triangles, found.closed and found.volume > 0)
-    return FileContents(path, measures, facets, triangles=(vertices, triangles))
+    return FileContents(path, form, measures, facets, triangles=(vertices, triangles))
 
 
 def _sizes(low: Sequence[float], high: Sequence[float], volume: float | None, area: float) -> dict[str, Any]:

@@ -130,7 +130,7 @@ def test_a_file_cut_short_is_refused(capsys: Captured, peg: Path, part: float) -
         (["--density", "0.3", "--skin", "-1"], "--skin = -1.0"),
         (["--density", "0.3", "--skin", "5"], "--skin = 5.0"),
         (["--density", "0.3", "--opening", ">Z"], "none without a skin"),
-        (["--density", "0.3", "--skin", "0.8", "--opening", "1,2"], "--openings = [1.0, 2.0]"),
+        (["--density", "0.3", "--skin", "0.8", "--opening", "1,2"], "--opening = [1.0, 2.0]"),
     ],
 )
 def test_bad_usage_is_one_line_and_leaves_no_file(capsys: Captured, peg: Path, options: list[str], words: str) -> None:

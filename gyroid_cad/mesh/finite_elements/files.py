@@ -20,7 +20,7 @@ from gyroid_cad.common.formats import (
     NASTRAN,
     VTU,
     Format,
-    listed_formats,
+    listed_endings,
     require_format,
 )
 from gyroid_cad.common.progress import Progress
@@ -47,12 +47,14 @@ def require_mesh_format(path: str | os.PathLike[str], full: bool = False) -> Pat
     ------
     ParameterError
     """
-    form = require_format("output", path, MESH_FORMATS)
+    target, form = Path(path), require_format("output", path, MESH_FORMATS)
     if full and form in _NO_FULL:
-        others = listed_formats([other for other in MESH_FORMATS if other not in _NO_FULL])
-        raise ParameterError("full", full, f"none in {form.name} files; {others} have elements of 27 nodes")
+        others = listed_endings([other for other in MESH_FORMATS if other not in _NO_FULL])
+        raise ParameterError(
+            "full", full, f"none in {target.suffix.lower()} files; elements of 27 nodes go into {others}"
+        )
     if form is ANSYS:
-        _mapdl_archive()
+        _mapdl_archive(path)
     return require_writable(path)
 
 
@@ -165,19 +167,19 @@ def _write_nastran(mesh: Mesh, path: Path) -> None:
     path.write_text("SOL 101\nCEND\n" + deck, encoding="ascii")
 
 
-def _mapdl_archive() -> Any:
+def _mapdl_archive(path: str | os.PathLike[str]) -> Any:
     try:
         import mapdl_archive
         import pyvista
     except ImportError:
         raise ParameterError(
-            "output", ".cdb", "another ending, or mapdl-archive installed: pip install 'gyroid_cad[ansys]'"
+            "output", str(path), "another ending, or mapdl-archive installed: pip install 'gyroid_cad[ansys]'"
         ) from None
     return mapdl_archive, pyvista
 
 
 def _write_ansys(mesh: Mesh, path: Path) -> None:
-    mapdl_archive, pyvista = _mapdl_archive()
+    mapdl_archive, pyvista = _mapdl_archive(path)
     vtk_type = {
         "hexahedron": pyvista.CellType.HEXAHEDRON,
         "hexahedron20": pyvista.CellType.QUADRATIC_HEXAHEDRON,

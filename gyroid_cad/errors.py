@@ -1,4 +1,4 @@
-"""What can go wrong, in words a user can act on: the parameter, its value, what is accepted."""
+"""Errors, in words a user can act on: the parameter, its value, what is accepted."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ for _command in (
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def fit_report_command(control_points: int, as_json: bool) -> None:
-    """What our fit and the paper's are worth, side by side.
+    """Compare our fit of the patch with the paper's, side by side.
 
     \b
     gyroid-cad fit-report

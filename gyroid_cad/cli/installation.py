@@ -1,4 +1,4 @@
-"""What is installed, in which version, and whether it works: packages, kernel, programs, one cell built and read."""
+"""Diagnosis of an installation: packages and their versions, kernel, programs, one cell built and read."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ GOOD, MISSING, FAILED = "good", "missing", "failed"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was found of one thing.
+    """Finding about one package or program.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Diagnosis:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing that is required is missing or fails."""
+        """Absence of anything required that is missing or fails."""
         return all(finding.state == GOOD for finding in self.findings if finding.required)
 
     def as_dict(self) -> dict[str, Any]:

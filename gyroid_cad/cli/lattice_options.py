@@ -40,7 +40,7 @@ _WRITTEN, _READ = ("output", "histogram", "screenshot"), ("printer",)
 
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
-    """What a file says takes the place of defaults, so that options on the command line override it."""
+    """Put a file's values in the place of defaults, so that options on the command line override them."""
     if path is not None and path.lower().endswith(_CONFIG_ENDING):
         from gyroid_cad.cli.config import read_config
 
@@ -55,7 +55,7 @@ def _defaults_from_file(context: click.Context, parameter: click.Parameter, path
 
 
 def _default(context: click.Context, config: Config, key: str, multiple: bool) -> Callable[[], Any]:
-    """What a file says of a key, asked for only where the command line says nothing of it."""
+    """Value that a file gives a key, taken only where the command line says nothing of it."""
 
     def value() -> Any:
         given = config.values[key]
@@ -70,7 +70,7 @@ def _default(context: click.Context, config: Config, key: str, multiple: bool) -
 
 
 def printed_options() -> str:
-    """What the command that runs was given, as TOML that it would read."""
+    """Options of the command that runs, as TOML that it would read."""
     from gyroid_cad.cli.config import printed_config
 
     context = click.get_current_context()
@@ -79,7 +79,7 @@ def printed_options() -> str:
 
 
 def _known_surfaces(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """What a shell may complete the name of a surface to."""
+    """Names that a shell may complete a surface to."""
     from gyroid_cad.surface.families import SURFACES
 
     return [name for name in SURFACES if name.startswith(incomplete)]
@@ -161,7 +161,7 @@ def lattice_options(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The same, where the argument may be other files as well: those that this text shows."""
+    """Add a lattice's options where the argument may be other files as well: those that this text shows."""
 
     def given_to(function: Callable[..., None]) -> Callable[..., None]:
         for option in reversed(_OPTIONS):

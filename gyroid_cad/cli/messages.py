@@ -1,4 +1,4 @@
-"""What the command line says when something fails: one line, with the names under which the user gave things."""
+"""Messages of the command line when something fails: one line, with the names under which the user gave things."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _message(problem: Exception | KeyboardInterrupt, context: click.Context | No
 
 
 def _of_click(problem: click.ClickException) -> str:
-    """What click says, but of a value from a file where it stands."""
+    """Message of click; of a value from a file with the place where it stands."""
     option = getattr(problem, "param", None)
     context = getattr(problem, "ctx", None)
     if isinstance(option, click.Option) and context is not None and option.name is not None:

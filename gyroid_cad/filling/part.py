@@ -1,4 +1,4 @@
-"""From a part and a lattice to the checked solids of what is left, shifting the lattice where the kernel fails."""
+"""Checked solids that a lattice leaves in a part; the lattice is shifted a little where the kernel fails."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Made:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What filling gave.
+    """Solids that filling gave, and how they came about.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filling:
-    """What stays the same however the lattice is shifted.
+    """A part to be filled: all that stays the same however the lattice is shifted.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Filling:
 
     @property
     def core(self) -> Part:
-        """What is filled: the part, or what its skin leaves of it."""
+        """The part that is filled: the whole one, or what its skin leaves of it."""
         return self.part if self.hollow is None else self.hollow.core
 
     def run(self, frame: Frame) -> Outcome:
@@ -148,7 +148,7 @@ class Filling:
         return Outcome(domains, infill, shift, cut, whole, by_sections)
 
     def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
-        """Of a box, whose sides are planes: cut without the kernel."""
+        """Fill a box, whose sides are planes, without the kernel's booleans."""
 
         box = self.core.box
         assert box is not None
@@ -253,7 +253,7 @@ def _size(made: Made) -> float:
 
 
 def _patches_of(left: TrimmedWall) -> tuple[int, int]:
-    """How many patches a box cuts, and how many it leaves whole."""
+    """Count the patches that a box cuts, and those that it leaves whole."""
     cut = {
         face.patch
         for face in left.faces

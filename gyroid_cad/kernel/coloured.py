@@ -1,4 +1,4 @@
-"""What is in a STEP file, with the colours it is to be shown in, through the kernel's document (XCAF)."""
+"""Shapes of a STEP file with the colours they are to be shown in, through the kernel's document (XCAF)."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class _Parts:
         self._parts: dict[int, list[Coloured]] = {}
 
     def placed(self, label: TDF_Label, location: TopLoc_Location, over: Colour) -> Iterator[Coloured]:
-        """What a label holds, moved; a colour of the occurrence goes before that of the part."""
+        """Shapes of a label, moved; a colour of the occurrence goes before that of the part."""
         if XCAFDoc_ShapeTool.IsReference_s(label):
             part = TDF_Label()
             XCAFDoc_ShapeTool.GetReferredShape_s(label, part)

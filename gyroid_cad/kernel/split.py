@@ -61,7 +61,7 @@ _BOTH_WAYS = {TopAbs_FORWARD, TopAbs_REVERSED}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
-    """What is left of a part and of faces that were split against each other.
+    """Pieces of a part's boundary and of faces that were split against each other.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
 
 
 def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[bool]:
-    """Which pieces of the part's boundary lie on the inner side of the lattice faces they meet.
+    """Find the pieces of the part's boundary that lie on the inner side of the lattice faces they meet.
 
     Two faces of a solid run through their common edge in opposite ways: so a piece of the boundary is wanted if it
     runs against the lattice face along the edge they share. Across the part's own edges nothing changes.
@@ -343,7 +343,7 @@ def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
 
 
 def modified(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    """What a shape has become in a general fuse: itself, if nothing crossed it."""
+    """Shapes that a shape has become in a general fuse: itself, if nothing crossed it."""
     if fuse.IsDeleted(shape):
         return []
     # Taken off one by one: to iterate over a list of the kernel's ends in an exception, a hundred times as slow.
@@ -382,7 +382,7 @@ def running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Con
 
 
 def lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
-    """Whether a face that crosses a solid's boundary nowhere lies in it."""
+    """Tell whether a face that crosses a solid's boundary nowhere lies in it."""
     classifier.Perform(inner_point(as_face(face), context), _CLASSIFYING_TOLERANCE)
     return bool(classifier.State() == TopAbs_IN)
 

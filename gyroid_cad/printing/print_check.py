@@ -1,4 +1,4 @@
-"""Whether a printer can make a part: does it fit, are its walls thick enough, does resin drain, is it one piece."""
+"""Check of a part against a printer: does it fit, are its walls thick enough, does resin drain, is it one piece."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PrintCheck:
-    """What a printer makes of a part; lengths in mm.
+    """Verdict on a part for a printer; lengths in mm.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class PrintCheck:
 
     @property
     def fits(self) -> bool:
-        """Whether it fits the build volume, its axes along the printer's in one order or another."""
+        """True if it fits the build volume, its axes along the printer's in one order or another."""
         return self.orientation is not None
 
     @property
@@ -93,7 +93,7 @@ class PrintCheck:
 
     @property
     def drains(self) -> bool | None:
-        """Whether channels are as wide as a drain hole is to be; None if that is not known."""
+        """True if channels are as wide as a drain hole is to be; None if that is not known."""
         return None if self.opening is None else self.opening >= self.printer.min_drain_hole
 
     @property
@@ -237,7 +237,7 @@ def _check_lattice(
 
 
 def trapped_voids(complex: CellComplex) -> int:
-    """How many regions of empty space within a lattice of whole patches do not reach outside.
+    """Count the regions of empty space within a lattice of whole patches that do not reach outside.
 
     The wall's surface falls into shells: both faces of every patch, joined across shared edges on either side and,
     where an edge is free, to each other by its side wall. Every piece of the lattice has one shell outside; each

@@ -20,7 +20,7 @@ _LENGTH = "a length in mm, a finite number above 0"
 
 @dataclass(frozen=True, slots=True)
 class Printer:
-    """What a printer asks of a part; lengths in mm.
+    """A printer's demands on a part; lengths in mm.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What can be told of a file: its solids as the kernel finds them, or its triangles."""
+"""Sections of the report on a file: its solids as the kernel finds them, or its triangles."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FileContents:
 
 
 def is_report_file(path: str) -> bool:
-    """Whether a path's ending is one of a file that can be reported on."""
+    """Tell whether a path's ending is one of a file that can be reported on."""
     return Path(path).suffix.lower() in FORMATS
 
 
@@ -63,7 +63,7 @@ def read_contents(path: str) -> FileContents:
 
 
 def file_section(contents: FileContents) -> dict[str, Any]:
-    """What the file holds."""
+    """Section on the contents of a file."""
     return {
         "format": FORMATS[contents.path.suffix.lower()].upper(),
         "bytes": contents.path.stat().st_size,

@@ -92,12 +92,12 @@ class CellComplex:
 
     @property
     def free(self) -> Booleans:
-        """Which edges bound one patch only; shape (edges,)."""
+        """Mask of the edges that bound one patch only; shape (edges,)."""
         return np.asarray(self.edge_patches[:, 1] == _NO_PATCH)
 
     @property
     def border_fans(self) -> Booleans:
-        """Which fans do not close round their corner; shape (fans,)."""
+        """Mask of the fans that do not close round their corner; shape (fans,)."""
         border = np.zeros(self.fan_count, dtype=bool)
         border[self.edge_fans[self.free].ravel()] = True
         return border

@@ -1,4 +1,4 @@
-"""How large a sphere passes through a lattice's channels, from the exact surface by distance.
+"""Pore limiting diameters: the largest spheres that pass through a lattice's channels.
 
 A network's throats are where the largest sphere that can travel through it without end is held: the places with the
 greatest least distance from the mid-surface along a path (the pore-limiting diameter of porous media). A wall's face
@@ -81,7 +81,7 @@ def pore_limiting_diameter(surface: MinimalSurface, cell_size: float, thickness:
 
 @lru_cache(maxsize=8)
 def network_throats(surface: MinimalSurface) -> PoreLimits:
-    """Where a surface's networks are narrowest for what travels through them.
+    """Throats of a surface's networks, where they are narrowest for what travels through them.
 
     A grid is flooded from the places furthest from the surface until the flood runs through the cell without end; the
     node that joins it is the throat, and its distance is then worked out to rounding from the exact surface.
@@ -210,7 +210,7 @@ def _held(distance: Floats) -> float:
 
 
 def _endless(filled: Booleans) -> bool:
-    """Whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images elsewhere."""
+    """Tell whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images."""
     from scipy import ndimage
 
     labels = ndimage.label(filled, np.ones((3, 3, 3)))[0]
@@ -240,6 +240,6 @@ def _endless(filled: Booleans) -> bool:
 
 
 def _cells_beyond(shape: tuple[int, ...], step: tuple[int, ...]) -> Integers:
-    """In which cell, from -1 to 1 along each axis, the node lies that a step (0 to 2, less 1) leads to."""
+    """Cell, from -1 to 1 along each axis, of the node that a step (0 to 2, less 1) leads to."""
     axes = [np.floor_divide(np.arange(size) + offset - 1, size) for size, offset in zip(shape, step, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

@@ -103,7 +103,7 @@ class VolumePatches:
 
     @property
     def rational(self) -> bool:
-        """Whether the weights differ, so that the patches are not polynomial."""
+        """True where the weights differ, so that the patches are not polynomial."""
         return bool(np.ptp(self.weights) > 0)
 
     def patch(self, index: int) -> NurbsVolume:

@@ -20,7 +20,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class TriangleMeasures:
-    """What triangles amount to.
+    """Measures of a mesh of triangles.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class TriangleMeasures:
 
 
 def triangle_measures(vertices: Floats, triangles: Integers) -> TriangleMeasures:
-    """What triangles are: their size, whether they close, and what they enclose.
+    """Measure triangles: their size, whether they close, and what they enclose.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
 
 
 def _locator(points: Floats, triangles: NDArray[np.int64]) -> Any:
-    """What finds the triangles that a line meets."""
+    """Locator of the triangles that a line meets."""
     core, model, support = _vtk("vtkCommonCore"), _vtk("vtkCommonDataModel"), _vtk("util.numpy_support")
     data, nodes, cells = model.vtkPolyData(), core.vtkPoints(), model.vtkCellArray()
     ends = np.arange(0, triangles.size + 1, 3)

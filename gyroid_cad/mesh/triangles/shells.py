@@ -119,7 +119,7 @@ def _connected(triangles: Integers, count: int) -> tuple[Integers, int]:
 
 
 def _inside_another(points: Floats, triangles: Integers, labels: Integers, shell: int) -> bool:
-    """Whether another shell goes round one: by the winding number of the others about a point of it.
+    """Tell whether another shell goes round one: by the winding number of the others about a point of it.
 
     Solid angles of triangles as of van Oosterom and Strackee (IEEE Trans. Biomed. Eng. 30, 1983).
     """

@@ -11,7 +11,7 @@ from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
-from gyroid_cad.wall.limits import percent_hint, require_density, require_one, require_thickness
+from gyroid_cad.wall.limits import require_density, require_one, require_thickness
 
 __all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
 
@@ -135,7 +135,7 @@ def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeL
     accepted = f"the network's volume fraction, one number above {low:.5f} and below {high:.5f}"
     fraction = finite_number("density", density, accepted)
     if not low < fraction < high:
-        raise ParameterError("density", density, accepted + percent_hint(fraction))
+        raise ParameterError("density", density, accepted)
     offset = float(tube.network_offset(fraction) * cell_size)
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)

@@ -15,6 +15,7 @@ from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
 from gyroid_cad.common.checks import finite_number
+from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
@@ -135,7 +136,7 @@ class Lattice(LatticeParameters):
     def write(
         self,
         *paths: str | os.PathLike[str],
-        schema: str = "ap214",
+        schema: Schema = "ap214",
         deviation: float | None = None,
         angle: float = 15.0,
         progress: Progress | None = None,

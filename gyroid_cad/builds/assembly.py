@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
+from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import FORMATS
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
@@ -77,7 +78,7 @@ class Assembly:
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
         return NamedPart(solid, PART_NAME, GREEN, faces)
 
-    def write(self, targets: Sequence[Path], schema: str = "ap214", progress: Progress | None = None) -> None:
+    def write(self, targets: Sequence[Path], schema: Schema = "ap214", progress: Progress | None = None) -> None:
         """Write STEP assemblies.
 
         Raises

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gyroid_cad.cli.messages import label, remember_config
+from gyroid_cad.cli.options import file_paths
+from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS, FitName
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
     from gyroid_cad.lattice import Lattice
 
 __all__ = [
-    "chosen_surface",
     "density_of",
     "lattice_of",
     "lattice_options",
@@ -78,19 +79,12 @@ def printed_options() -> str:
     return printed_config({name: context.params[name] for name in keys if name not in _NO_KEYS})
 
 
-def _known_surfaces(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Names that a shell may complete a surface to."""
-    from gyroid_cad.surface.families import SURFACES
-
-    return [name for name in SURFACES if name.startswith(incomplete)]
-
-
-# Which surfaces there are is for the table of families to say; it is not read for --help alone.
 surface_option = click.option(
     "--surface",
-    metavar="NAME",
-    shell_complete=_known_surfaces,
-    help="gyroid, diamond or primitive; gyroid if left out.",
+    type=click.Choice(SURFACE_NAMES),
+    default="gyroid",
+    show_default=True,
+    help="The minimal surface that the wall follows.",
 )
 porosity_option = click.option(
     "--porosity", metavar="P", help="Empty part of the volume instead: 1 - density; may be an expression too."
@@ -129,7 +123,7 @@ _OPTIONS = (
     click.option("--bc-length", metavar="B", help="The paper's: length of a bounding cell, instead of --cell-size."),
     click.option("--scale", type=float, metavar="MM", help="Millimetres per unit of BC length; 1 if left out."),
     click.option(
-        "--trim", metavar="SHAPE", help="box: cut to the block of cells, flat sides instead of whole patches."
+        "--trim", type=click.Choice(TRIMS), help="Cut to the block of cells: flat sides instead of whole patches."
     ),
     click.option(
         "--tolerance",
@@ -147,7 +141,7 @@ _OPTIONS = (
     ),
     click.option(
         "--fit",
-        type=click.Choice(["smooth", "paper"]),
+        type=click.Choice(FITS),
         default="smooth",
         show_default=True,
         help="The paper's own leaves gaps between patches, and is refused with their size.",
@@ -174,7 +168,12 @@ def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callab
         )
         function = outside(function)
         argument = click.argument(
-            "config", required=False, metavar=f"[{files}]", is_eager=True, callback=_defaults_from_file
+            "config",
+            required=False,
+            metavar=f"[{files}]",
+            is_eager=True,
+            callback=_defaults_from_file,
+            shell_complete=file_paths,
         )
         return argument(function)
 
@@ -186,11 +185,6 @@ def options_given(but: Collection[str]) -> list[str]:
     context, line = click.get_current_context(), click.core.ParameterSource.COMMANDLINE
     named = [name for name in context.params if name not in but and context.get_parameter_source(name) == line]
     return [label(context, name) for name in named]
-
-
-def chosen_surface(name: str | None) -> dict[str, Any]:
-    """The keyword for a surface, or none where none was asked for."""
-    return {} if name is None else {"surface": name}
 
 
 def lattice_of(given: dict[str, Any]) -> Lattice:
@@ -208,7 +202,6 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         )
     fit = _fit_settings(given["fit"], given["control_points"])
     _require_given(given, "cells")
-    surface = chosen_surface(given["surface"])
     if any(given[name] is not None for name in _PAPER_OPTIONS):
         mixed = [name for name in _OWN_OPTIONS if given[name] is not None]
         if mixed or given["thickness_factor"] is None:
@@ -217,11 +210,11 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
                 f"{_listed(mixed or _OWN_OPTIONS)}"
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
-        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], **surface)
+        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
     _require_given(given, "cell_size")
     require_one_wall(given)
-    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "trim")}
-    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, **surface, fit=fit)
+    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "trim", "surface")}
+    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, fit=fit)
 
 
 def require_one_wall(given: dict[str, Any]) -> None:
@@ -268,7 +261,7 @@ def _listed(names: Collection[str], between: str = ", ") -> str:
     return between.join(label(context, name) for name in names)
 
 
-def _fit_settings(fit: str, control_points: int) -> Any:
+def _fit_settings(fit: FitName, control_points: int) -> Any:
     from gyroid_cad.surface.fit import FitSettings
 
     if fit == "smooth":

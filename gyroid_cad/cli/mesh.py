@@ -11,6 +11,7 @@ import click
 
 from gyroid_cad.cli.console import print_mesh, print_table, print_volumes, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options
+from gyroid_cad.cli.options import json_option, one_of, output_option, quiet_option
 from gyroid_cad.common.files import file_sizes, require_distinct
 from gyroid_cad.common.progress import timed
 
@@ -18,13 +19,7 @@ __all__ = ["mesh_command", "volumes_command"]
 
 
 @click.command("mesh")
-@click.option(
-    "-o",
-    "--output",
-    multiple=True,
-    metavar="FILE",
-    help=".vtu, .msh (Gmsh), .inp (Abaqus, CalculiX), .cdb (ANSYS), .bdf or .nas (NASTRAN); may be repeated.",
-)
+@output_option(".vtu, .msh (Gmsh), .inp (Abaqus, CalculiX), .cdb (ANSYS), .bdf or .nas (NASTRAN); may be repeated.")
 @lattice_options
 @click.option(
     "--subdivisions", type=int, metavar="N", help="Elements along each side of a patch, of 24 a gyroid's cell."
@@ -37,12 +32,20 @@ __all__ = ["mesh_command", "volumes_command"]
     metavar="M",
     help="Of hexahedra across the wall; 0 for quadrilaterals of the mid-surface.",
 )
-@click.option("--order", type=int, default=1, show_default=True, metavar="1|2", help="Linear or quadratic elements.")
+@click.option(
+    "--order",
+    type=int,
+    default=1,
+    show_default=True,
+    metavar="1|2",
+    shell_complete=one_of("1", "2"),
+    help="Linear or quadratic elements.",
+)
 @click.option("--full", is_flag=True, help="Quadratic hexahedra of 27 nodes instead of 20, quadrilaterals of 9 not 8.")
 @click.option("--quality", is_flag=True, help="Measure every element, as Verdict defines the measures.")
 @click.option("--histogram", metavar="FILE.png", help="Draw the measures' histograms; needs matplotlib.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+@json_option
+@quiet_option
 def mesh_command(
     output: tuple[str, ...],
     subdivisions: int | None,
@@ -122,17 +125,19 @@ def mesh_command(
 
 
 @click.command("volumes")
-@click.option(
-    "-o",
-    "--output",
-    multiple=True,
-    metavar="FILE",
-    help=".mesh (MFEM NURBS mesh v1.0), .xml (G+Smo multipatch), .json or .npz; may be repeated.",
-)
+@output_option(".mesh (MFEM NURBS mesh v1.0), .xml (G+Smo multipatch), .json or .npz; may be repeated.")
 @lattice_options
-@click.option("--degree", type=int, default=1, show_default=True, metavar="1|3", help="Across the wall; 3 along it.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+@click.option(
+    "--degree",
+    type=int,
+    default=1,
+    show_default=True,
+    metavar="1|3",
+    shell_complete=one_of("1", "3"),
+    help="Across the wall; 3 along it.",
+)
+@json_option
+@quiet_option
 def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: bool, **given: Any) -> None:
     """Write a lattice as conforming trivariate NURBS patches, for isogeometric analysis.
 

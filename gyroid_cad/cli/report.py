@@ -12,6 +12,7 @@ import click
 
 from gyroid_cad.cli.console import print_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
+from gyroid_cad.cli.options import file_paths, printer_option
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ _COMMON = {"config", "output", "as_json", "quiet", "help"}
     "--output",
     multiple=True,
     metavar="FILE.html",
+    shell_complete=file_paths,
     help="One page that needs nothing else and opens offline.",
 )
 @lattice_options_beside("LATTICE.toml|FILE")
@@ -41,13 +43,7 @@ _COMMON = {"config", "output", "as_json", "quiet", "help"}
     metavar="N",
     help="Elements along each side of a patch, of the mesh whose quality is told.",
 )
-@click.option(
-    "--printer",
-    default="form2",
-    show_default=True,
-    metavar="NAME",
-    help="By which the lattice is checked; one that is known, or a .toml file.",
-)
+@printer_option("By which the lattice is checked; one that is known, or a .toml file.", "form2")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--quiet", is_flag=True, help="Print nothing and no progress.")
 def report_command(

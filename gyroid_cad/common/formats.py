@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 
+from gyroid_cad.common.choices import SCHEMAS, Schema
 from gyroid_cad.common.files import require_distinct, require_writable
 from gyroid_cad.errors import ParameterError
 
 __all__ = [
     "DEFAULT_ANGLE",
     "FORMATS",
-    "SCHEMAS",
     "TRIANGLE_FORMATS",
     "require_formats",
     "require_meshing",
@@ -25,7 +25,7 @@ __all__ = [
 FORMATS = {".step": "step", ".stp": "step", ".brep": "brep", ".stl": "stl", ".3mf": "3mf"}
 TRIANGLE_FORMATS = ("stl", "3mf")
 # By the names of the kernel's STEP writer.
-SCHEMAS = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
+_KERNEL_SCHEMAS: Mapping[Schema, str] = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
 # Degrees between neighbouring facets.
 DEFAULT_ANGLE = 15.0
 
@@ -46,16 +46,16 @@ def _require_format(path: str | os.PathLike[str]) -> Path:
     return require_writable(path)
 
 
-def require_schema(schema: str) -> str:
+def require_schema(schema: Schema) -> str:
     """The kernel's name of a schema.
 
     Raises
     ------
     ParameterError
     """
-    if schema not in tuple(SCHEMAS):
+    if schema not in SCHEMAS:
         raise ParameterError("schema", schema, " or ".join(SCHEMAS))
-    return SCHEMAS[schema]
+    return _KERNEL_SCHEMAS[schema]
 
 
 def require_meshing(deviation: float, angle: float = DEFAULT_ANGLE) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from gyroid_cad.cli.console import print_fill, shown_progress
-from gyroid_cad.cli.lattice_options import surface_option
+from gyroid_cad.cli.lattice_options import density_of, porosity_option, require_one_wall, surface_option
 from gyroid_cad.cli.options import (
     angle_option,
     deviation_option,
@@ -40,6 +40,7 @@ __all__ = ["fill_command"]
 @click.option(
     "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a network."
 )
+@porosity_option
 @click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
 @click.option(
     "--opening",
@@ -93,10 +94,14 @@ def fill_command(
     from gyroid_cad.filling.fill import fill
     from gyroid_cad.surface.fit import FitSettings
 
+    if given["kind"] != "surface":
+        require_one_wall(given)
     require_formats(output)
     require_settings((1, 1, 1), schema, deviation, angle)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         faces = [_face(opening) for opening in openings]
+        given["density"] = density_of(given)
+        del given["porosity"]
         filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
         filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
     summary = filled.report.as_dict()

@@ -293,8 +293,11 @@ def _described(
         made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
+            name, given = ("thickness", thickness) if density is None else ("density", density)
             raise ParameterError(
-                "thickness", made.max_thickness, f"less than the part's smallest extent, {smallest:.6g} mm"
+                name,
+                given,
+                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
             )
         return made
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import FORMATS
+from gyroid_cad.common.formats import STEP, require_format
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import KernelError, ParameterError
@@ -197,7 +197,5 @@ def require_assembly_formats(targets: Sequence[Path]) -> None:
     ------
     ParameterError
     """
-    endings = [ending for ending, form in FORMATS.items() if form == "step"]
     for path in targets:
-        if path.suffix.lower() not in endings:
-            raise ParameterError("output", str(path), f"a name ending in {' or '.join(endings)} for an assembly")
+        require_format("output", path, [STEP], "an assembly: a file name ending in ")

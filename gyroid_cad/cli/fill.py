@@ -22,13 +22,14 @@ from gyroid_cad.cli.options import (
 )
 from gyroid_cad.common.choices import KINDS, Schema
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 __all__ = ["fill_command"]
 
 
 @click.command("fill")
 @click.argument("part", metavar="PART.step", shell_complete=file_paths)
-@output_option(".step, .stp, .brep, .stl or .3mf; may be repeated.", required=True)
+@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.", required=True)
 @surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(

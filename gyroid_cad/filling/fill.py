@@ -24,8 +24,7 @@ from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.kernel.check import topology
-from gyroid_cad.kernel.part import Part, require_part
-from gyroid_cad.kernel.selection import selected_faces
+from gyroid_cad.kernel.part import Part, require_part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.split import compound_of

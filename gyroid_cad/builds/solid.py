@@ -181,7 +181,7 @@ def write_shape(
     """
     from gyroid_cad.kernel.brep import write_brep
     from gyroid_cad.kernel.step import write_step
-    from gyroid_cad.kernel.stl import meshed, write_stl
+    from gyroid_cad.kernel.stl import meshed, write_meshed_stl
     from gyroid_cad.mesh.triangles.three_mf import write_3mf
 
     form = format_of(path)
@@ -190,7 +190,7 @@ def write_shape(
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:
-        write_stl(shape, path, deviation, angle)
+        write_meshed_stl(shape, path, deviation, angle)
     else:
         write_3mf(*meshed(shape, path, deviation, angle), path)
 

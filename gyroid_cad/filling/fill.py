@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyroid_cad.builds.solid import require_settings, write_shape
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
@@ -40,7 +41,6 @@ from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 __all__ = ["FillReport", "Filled", "fill", "part_of"]
 
 Floats = NDArray[np.float64]
-Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -145,7 +145,7 @@ def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytes
     page = page_of(report)
     assert "<h2>Print check</h2>" in page
     assert "resin" in page
-    assert Page(page).numbers["print_check.walls.0.thinnest"] == "0.5"
+    assert Page(page).numbers["print_check.walls.0.min_thickness"] == "0.5"
     assert Page(page).numbers["print_check.fits"] == "true"
     assert report.as_dict()["print_check"]["layers"] == 3
 

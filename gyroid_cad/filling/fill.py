@@ -6,10 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
@@ -20,6 +21,13 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.kernel.check import topology
+from gyroid_cad.kernel.part import Part, require_part
+from gyroid_cad.kernel.selection import selected_faces
+from gyroid_cad.kernel.skin import Hollow, hollow
+from gyroid_cad.kernel.solid import KernelShape, another_handle
+from gyroid_cad.kernel.split import compound_of
+from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
@@ -28,11 +36,6 @@ from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE
-
-if TYPE_CHECKING:
-    from gyroid_cad.kernel.part import Part
-    from gyroid_cad.kernel.skin import Hollow
-    from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["FillReport", "Filled", "fill", "part_of"]
 
@@ -122,8 +125,6 @@ class Filled:
 
     def solid(self) -> KernelShape:
         """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own."""
-        from gyroid_cad.kernel.solid import another_handle
-        from gyroid_cad.kernel.split import compound_of
 
         shapes = list(self.domains.values())
         return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
@@ -300,8 +301,6 @@ def _described(
 
 
 def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
-    from gyroid_cad.kernel.selection import selected_faces
-    from gyroid_cad.kernel.skin import hollow
 
     return hollow(part, skin, selected_faces(part, openings))
 
@@ -309,8 +308,6 @@ def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
 def _reported(
     filling: Filling, outcome: Outcome, kind: str, skin: float | None, drop_islands: bool, grams: float | None
 ) -> Filled:
-    from gyroid_cad.kernel.check import topology
-    from gyroid_cad.kernel.split import compound_of
 
     domains = outcome.domains
     islands, dropped = sum(len(some) - 1 for some in domains.values()), 0
@@ -366,9 +363,6 @@ def part_of(given: Any) -> Part:
     ExportError
         If a file is no STEP file or holds no shape.
     """
-    from gyroid_cad.kernel.part import require_part
-    from gyroid_cad.kernel.split import compound_of
-    from gyroid_cad.kernel.step import read_step
 
     if isinstance(given, str | os.PathLike):
         return require_part(read_step(given))
@@ -382,6 +376,5 @@ def part_of(given: Any) -> Part:
 
 def _turn(degrees: Floats) -> Floats:
     """Turns about x, then y, then z."""
-    from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_euler("xyz", degrees, degrees=True).as_matrix())

@@ -12,6 +12,7 @@ from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field
 from gyroid_cad.filling.wanted import Region, Regions
+from gyroid_cad.kernel.solid import build_faces, build_patches
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
@@ -108,7 +109,6 @@ class Infill:
 
     def faces(self, region: Region) -> list[list[Any]]:
         """The faces of every patch that bound a region, oriented out of it; neighbours share their edges."""
-        from gyroid_cad.kernel.solid import build_faces, build_patches
 
         if not self.endless:
             return build_patches(self.wall)

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
+from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.part import Part, measure
+from gyroid_cad.kernel.regions import split_by_region
+from gyroid_cad.kernel.skin import Hollow
+from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.split import bounded_solids, compound_of, shells_of
+from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
-
-if TYPE_CHECKING:
-    from gyroid_cad.kernel.part import Part
-    from gyroid_cad.kernel.skin import Hollow
-    from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Filling", "Made", "Outcome"]
 
@@ -146,7 +149,6 @@ class Filling:
 
     def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
         """Of a box, whose sides are planes: cut without the kernel."""
-        from gyroid_cad.kernel.trimmed import build_trimmed
 
         box = self.core.box
         assert box is not None
@@ -172,17 +174,12 @@ class Filling:
 
     def _less(self, voids: list[Made]) -> Made:
         """The part less voids within it."""
-        from gyroid_cad.kernel.part import measure
-        from gyroid_cad.kernel.trimmed import hollowed_by
 
         volume, area = measure(self.part.shape)
         shape = hollowed_by(self.part.shape, (void.shape for void in voids))
         return Made(shape, volume - sum(void.volume for void in voids), area + sum(void.area for void in voids))
 
     def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
-        from gyroid_cad.kernel.part import measure
-        from gyroid_cad.kernel.regions import split_by_region
-        from gyroid_cad.kernel.split import bounded_solids, shells_of
 
         with self.timed("cover"):
             sides = infill.sides(self._distance_from_boundary(), self.core.contains)
@@ -217,7 +214,6 @@ class Filling:
         return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
 
     def _distance_from_boundary(self) -> Callable[[Floats], Floats]:
-        from scipy.spatial import cKDTree
 
         samples, error = self.core.surface_samples(_BOUNDARY_SPACING * self.cell_size)
         tree = cKDTree(samples)
@@ -242,8 +238,6 @@ class Filling:
             )
 
     def _require_simple(self, shapes: Iterable[KernelShape]) -> None:
-        from gyroid_cad.kernel.check import is_valid, topology
-        from gyroid_cad.kernel.split import compound_of
 
         everything = compound_of(shapes)
         counted, valid = topology(everything), is_valid(everything)

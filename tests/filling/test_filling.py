@@ -14,8 +14,8 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial.transform import Rotation
 
+import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
-import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.filling.fill import Filled, _turn, fill, part_of
 from gyroid_cad.filling.part import Filling
@@ -309,7 +309,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
             raise KernelError("tangent")
         return split(*arguments)
 
-    monkeypatch.setattr(gyroid_cad.kernel.regions, "split_by_region", failing_once)
+    monkeypatch.setattr(gyroid_cad.filling.part, "split_by_region", failing_once)
     report = fill(ball(), CELL, WALL, fit=COARSE).report
     assert len(calls) == 2
     assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
@@ -319,7 +319,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
 @pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
 def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
     solids = [ball().val().wrapped] if wrong == "the part itself" else []
-    monkeypatch.setattr(gyroid_cad.kernel.regions, "split_by_region", lambda *arguments: None)
-    monkeypatch.setattr(gyroid_cad.kernel.split, "bounded_solids", lambda *arguments: solids)
+    monkeypatch.setattr(gyroid_cad.filling.part, "split_by_region", lambda *arguments: None)
+    monkeypatch.setattr(gyroid_cad.filling.part, "bounded_solids", lambda *arguments: solids)
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(ball(), CELL, WALL, fit=COARSE)

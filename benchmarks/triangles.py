@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmarks.timing import Row, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
 from gyroid_cad.common.files import replacing
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.measuring import enclosed_volume
 from gyroid_cad.mesh.triangles.stl import write_stl
@@ -105,11 +106,10 @@ def _counted(meshed: Any) -> tuple[int, float]:
     from OCP.TopAbs import TopAbs_FACE
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
     count, explorer = 0, TopExp_Explorer(meshed, TopAbs_FACE)
     while explorer.More():
-        count += BRep_Tool.Triangulation_s(TopoDS.Face_s(explorer.Current()), TopLoc_Location()).NbTriangles()
+        count += BRep_Tool.Triangulation_s(as_face(explorer.Current()), TopLoc_Location()).NbTriangles()
         explorer.Next()
     properties = GProp_GProps()
     BRepGProp.VolumeProperties_s(meshed, properties, False, False, True)

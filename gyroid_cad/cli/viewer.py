@@ -69,6 +69,8 @@ def view(
     if picture is None:
         _require_display()
     shown = _of_lattice(what, progress) if isinstance(what, Lattice) else _of_file(Path(what))
+    if not any(len(facets.corners) for facets in shown):
+        raise GyroidError(f"{what} holds no face to be seen")
     if picture is None:
         _show(shown, f"{what.surface} lattice" if isinstance(what, Lattice) else Path(what).name)
         return

@@ -13,17 +13,17 @@ from OCP.IFSelect import IFSelect_RetDone
 from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TCollection import TCollection_AsciiString
-from OCP.TDF import TDF_Label, TDF_LabelSequence, TDF_Tool
+from OCP.TDF import TDF_Label, TDF_Tool
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_FACE
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_ColorTool, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.assembly import new_document
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import LabelSequence, NumberedShapes
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.step import no_messages
 
@@ -69,7 +69,7 @@ def coloured_parts(path: str | os.PathLike[str]) -> list[ColouredPart]:
     with no_messages():
         if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
             raise ExportError(f"{path} could not be read as STEP")
-    free = TDF_LabelSequence()
+    free = LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
     found = _Occurrences(document)
     for label in _labels(free):
@@ -105,7 +105,7 @@ class _Occurrences:
             own = XCAFDoc_ShapeTool.GetLocation_s(label)
             self.add(part, location.Multiplied(own), over or self._colour(label))
         elif XCAFDoc_ShapeTool.IsAssembly_s(label):
-            components = TDF_LabelSequence()
+            components = LabelSequence()
             XCAFDoc_ShapeTool.GetComponents_s(label, components)
             for component in _labels(components):
                 self.add(component, location, over)
@@ -127,7 +127,7 @@ class _Occurrences:
         ]
 
     def _face_colours(self, label: TDF_Label, shape: TopoDS_Shape) -> Iterator[Colour]:
-        subshapes, numbered = TDF_LabelSequence(), TopTools_IndexedMapOfShape()
+        subshapes, numbered = LabelSequence(), NumberedShapes()
         XCAFDoc_ShapeTool.GetSubShapes_s(label, subshapes)
         own = {numbered.Add(XCAFDoc_ShapeTool.GetShape_s(one)): self._colour(one) for one in _labels(subshapes)}
         whole = self._colour(label)
@@ -149,5 +149,5 @@ def _matrix(location: TopLoc_Location) -> Floats:
     return np.array([[placement.Value(row, column) for column in range(1, 5)] for row in range(1, 4)])
 
 
-def _labels(sequence: TDF_LabelSequence) -> Iterator[TDF_Label]:
+def _labels(sequence: LabelSequence) -> Iterator[TDF_Label]:
     return (sequence.Value(number) for number in range(1, sequence.Length() + 1))

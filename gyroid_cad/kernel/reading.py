@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepTools import BRepTools
 from OCP.Geom import Geom_BSplineSurface
 from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.stl import diagonal, meshed_by_face
@@ -85,11 +85,9 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
 
 def described(shape: TopoDS_Shape) -> Described:
     """Measure and check a shape, whatever it is."""
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    corners = (0.0,) * 6 if box.IsVoid() else box.Get()
+    low, high = bounding_box(shape).tolist()
     volume, area = measure(shape)
-    return Described(topology(shape), is_valid(shape), tuple(corners[:3]), tuple(corners[3:]), volume, area)
+    return Described(topology(shape), is_valid(shape), tuple(low), tuple(high), volume, area)
 
 
 def shown_triangles(
@@ -113,7 +111,7 @@ def lattice_sides(shape: TopoDS_Shape) -> list[int | None]:
     None of those that are no part of a lattice's faces. These are told by their surfaces, cubic B-splines on the square
     from -1 to 1 both ways, which run along the wall's normals: on side 0 the face is turned against its surface.
     """
-    return [_lattice_side(TopoDS.Face_s(face)) for face in parts_of(shape, TopAbs_FACE)]
+    return [_lattice_side(as_face(face)) for face in parts_of(shape, TopAbs_FACE)]
 
 
 def _lattice_side(face: TopoDS_Face) -> int | None:

@@ -20,13 +20,13 @@ from OCP.StlAPI import StlAPI_Writer
 from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.solid import TOLERANCE
 
 __all__ = ["diagonal", "meshed", "meshed_by_face", "write_stl"]
@@ -123,7 +123,7 @@ def meshed_by_face(
 
 
 def _triangle_count(face: TopoDS_Shape) -> int:
-    mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(face), TopLoc_Location())
+    mesh = BRep_Tool.Triangulation_s(as_face(face), TopLoc_Location())
     return 0 if mesh is None else int(mesh.NbTriangles())
 
 
@@ -155,11 +155,9 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     """Move mesh nodes at vertices that coincide but are not the same, each into its own faces."""
     from scipy.spatial import cKDTree
 
-    faces_of_vertex = TopTools_IndexedDataMapOfShapeListOfShape()
+    faces_of_vertex = ShapesOfShape()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex)
-    points = [
-        BRep_Tool.Pnt_s(TopoDS.Vertex_s(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)
-    ]
+    points = [BRep_Tool.Pnt_s(as_vertex(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)]
     positions = np.array([(p.X(), p.Y(), p.Z()) for p in points])
     distance = max(
         _PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * float(np.abs(positions).max())
@@ -167,7 +165,7 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
     for vertex in touching.tolist():
         # A face used by two edges at the vertex is listed twice.
-        faces = {face.__hash__(): TopoDS.Face_s(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
+        faces = {face.__hash__(): as_face(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
         meshes = [_placed_mesh(face) for face in faces.values()]
         inward = np.mean([nodes.mean(axis=0) - positions[vertex] for _, _, nodes in meshes], axis=0)
         step = gp_Vec(*(inward * (distance / np.linalg.norm(inward))).tolist())

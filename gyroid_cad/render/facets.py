@@ -16,7 +16,7 @@ from gyroid_cad.wall.offset import SIDES, Wall
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["COLOURS", "Colour", "Facets", "facets_of_shape", "facets_of_triangles", "facets_of_wall", "joined"]
+__all__ = ["COLOURS", "Colour", "Facets", "facets_of_shape", "facets_of_triangles", "facets_of_wall"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -94,7 +94,7 @@ def facets_of_wall(wall: Wall) -> Facets:
     for side in SIDES:
         placed = points[wall.patch_net, side] + shifts[:, np.newaxis, np.newaxis]
         parts.append(_facets_of_grids(placed, normals[wall.patch_net, side], COLOURS[side], backwards=side == 0))
-    return joined([*parts, *_side_walls(wall, samples)])
+    return _joined([*parts, *_side_walls(wall, samples)])
 
 
 def _side_walls(wall: Wall, samples: Floats) -> list[Facets]:
@@ -114,9 +114,7 @@ def _side_walls(wall: Wall, samples: Floats) -> list[Facets]:
     return [_facets_of_grids(placed, normals, COLOURS[REST])]
 
 
-def _facets_of_grids(
-    points: Floats, normals: Floats, colour: Colour, backwards: bool = False
-) -> Facets:
+def _facets_of_grids(points: Floats, normals: Floats, colour: Colour, backwards: bool = False) -> Facets:
     """Triangles of grids, shape (grids, a, b, 3), each a face; turned round if they face inwards."""
     corners = []
     for grid in (points, normals):
@@ -188,15 +186,18 @@ def facets_of_shape(
     from gyroid_cad.kernel.check import topology
     from gyroid_cad.kernel.reading import lattice_sides, shown_triangles
 
-    vertices, triangles, faces = shown_triangles(shape, extent)
     usual = [COLOURS[REST if side is None else side] for side in lattice_sides(shape)]
+    if not usual:
+        # The kernel's mesher refuses to mesh nothing.
+        return facets_of_triangles(np.empty((0, 3)), np.empty((0, 3)), closed=False)
+    vertices, triangles, faces = shown_triangles(shape, extent)
     own = usual if colours is None else [colour or other for colour, other in zip(colours, usual, strict=True)]
     by_triangle = np.array(own).reshape(-1, 3)[faces]
     made = facets_of_triangles(vertices, triangles, topology(shape).closed, faces, by_triangle)
     return made if places is None else replace(made, places=places)
 
 
-def joined(parts: Sequence[Facets]) -> Facets:
+def _joined(parts: Sequence[Facets]) -> Facets:
     """Facets that stand in the same places, together; each part's faces apart from those of the others."""
     firsts = np.cumsum([0, *(int(part.faces.max(initial=-1)) + 1 for part in parts)])
     return Facets(

@@ -208,7 +208,7 @@ class Lattice(LatticeParameters):
         return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
-        """Whether the solid must be built for files with these endings: not for triangles of whole patches."""
+        """Tell whether files with these endings need the solid: triangles of whole patches do not."""
         formats = {FORMATS[Path(path).suffix.lower()] for path in paths}
         return bool(self.trim) or not formats <= set(TRIANGLE_FORMATS)
 
@@ -331,7 +331,7 @@ class Lattice(LatticeParameters):
         return MOST_DRAWN_PATCHES // len(self.minimal_surface.cell)
 
     def _shown(self) -> list[tuple[str, str]]:
-        """What a notebook says of it, beside its picture."""
+        """Rows that a notebook shows beside the picture."""
         rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
         drawn = prod(self.cells) <= self._most_drawn
         # What varies over so many cells would take long to measure.
@@ -356,5 +356,5 @@ class Lattice(LatticeParameters):
         return fitted_wall(self.spec(), progress)
 
     def _deviation(self, given: float | None) -> float:
-        """Of triangles, in mm; the usual one if none is given."""
+        """Largest deviation of triangles, in mm; the usual one if none is given."""
         return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given

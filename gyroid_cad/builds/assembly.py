@@ -102,7 +102,7 @@ class Assembly:
 
 @dataclass(frozen=True, slots=True)
 class AssemblyReport:
-    """What an assembly is.
+    """Report on an assembly: its cells, faces, volume and file.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From numbers to a checked solid and its files, stage by stage, timed."""
+"""A checked solid and its files, made stage by stage, timed."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Build:
         raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
 
     def _volume_in_box(self) -> float | None:
-        """Of whole cells, all alike; none where they vary."""
+        """Volume of the wall in whole uniform cells, in mm3; None where they vary."""
         if not self.fitted.spec.grading.uniform:
             return None
         cell = np.unique(self.fitted.wall.patch_net, return_index=True)[1]
@@ -127,7 +127,7 @@ class Build:
         return another_handle(self._shape)
 
     def valid(self, progress: Progress | None = None) -> bool:
-        """Whether the kernel's own check, asked once, finds the solid valid."""
+        """Verdict of the kernel's own check, asked once."""
         if self._valid is None:
             from gyroid_cad.kernel.check import is_valid
 

@@ -1,4 +1,4 @@
-"""From the wall of a lattice to files of triangles, stage by stage, timed: no kernel, no solid."""
+"""Triangles of a lattice's wall and their files, made stage by stage, timed: no kernel, no solid."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Triangles:
 
 @dataclass(frozen=True, slots=True)
 class TriangleReport:
-    """What the triangles of a lattice are worth.
+    """Report on the triangles of a lattice.
 
     Attributes
     ----------

@@ -80,7 +80,7 @@ def view(
 
 
 def has_display() -> bool:
-    """Whether a window could be opened: elsewhere than on Linux there always is a desktop."""
+    """Tell whether a window could be opened: elsewhere than on Linux there always is a desktop."""
     if not sys.platform.startswith("linux"):
         return True
     try:

@@ -45,7 +45,7 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FillReport:
-    """What a filled part turned out to be.
+    """Report on a filled part.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a part may be filled with: regions of space between offsets of the mid-surface."""
+"""Regions of space between offsets of the mid-surface, with which a part may be filled."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class Region:
     fluid: bool = False
 
     def contains(self, offsets: Floats, half_thickness: Floats) -> Booleans:
-        """Which offsets, in mm, lie between, where the half wall is so many mm."""
+        """Mask of the offsets, in mm, that lie in the region where the wall's half thickness is so many mm."""
         low = -np.inf if self.lowest is None else self.lowest * half_thickness
         high = np.inf if self.highest is None else self.highest * half_thickness
         return np.asarray((offsets > low) & (offsets < high))
 
     @property
     def sides(self) -> list[tuple[int, bool]]:
-        """Which of the wall's faces, 0 or 1, bound it, and whether against the common normal."""
+        """The wall's faces, 0 or 1, that bound the region, each with whether it runs against the common normal."""
         if self.surface:
             return [(1, False)]
         below = [] if self.lowest is None else [(int(self.lowest >= 0), True)]

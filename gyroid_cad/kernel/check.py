@@ -1,4 +1,4 @@
-"""What the kernel really holds: closed or not, valid or not, and how much it encloses."""
+"""Checks of the kernel's shapes: closed, valid, and the volume they enclose."""
 
 from __future__ import annotations
 

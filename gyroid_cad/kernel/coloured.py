@@ -1,4 +1,4 @@
-"""What is in a STEP file, with the colours it is to be shown in, through the kernel's document (XCAF)."""
+"""Shapes of a STEP file with the colours they are to be shown in, through the kernel's document (XCAF)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How deep places in a solid lie below its faces, and whether what is left inside a skin lies as deep as it should."""
+"""Depth of points below a solid's faces, by which the core that a skin leaves is confirmed."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Faces:
         return bool(self._faces)
 
     def distance(self, point: Floats) -> float:
-        """Of a point, shape (3,), from the nearest of them, in mm; infinite if there are none."""
+        """Distance of a point, shape (3,), from the nearest face, in mm; infinite if there are none."""
         away = np.maximum(np.maximum(self._low - point, point - self._high), 0)
         at_least = np.linalg.norm(away, axis=1)
         vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
@@ -70,12 +70,12 @@ class Faces:
         return float(nearest)
 
     def distances(self, points: Floats) -> Floats:
-        """Of points, shape (n, 3); shape (n,)."""
+        """Distances of points, shape (n, 3), from the nearest face, in mm; shape (n,)."""
         return np.array([self.distance(point) for point in points])
 
 
 class Depths:
-    """How deep places in a solid lie below those of its faces that are no openings.
+    """Depth of points in a solid below those of its faces that are no openings.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Depths:
         return float(depths.max(initial=0.0))
 
     def confirm(self, core: Sequence[TopoDS_Solid], skin: float) -> bool:
-        """Whether solids are closed, valid, and what is left of this one less a skin, as far as points tell."""
+        """Confirm that solids are closed, valid, and what a skin leaves of this one, as far as points tell."""
         if not core or any(measure(one)[0] <= 0 or not is_valid(one) or not topology(one).closed for one in core):
             return False
         least, most = _THINNEST * skin, _THICKEST * skin

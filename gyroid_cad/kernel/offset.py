@@ -52,7 +52,7 @@ _SOLID = "solid.bin"
 def offsets(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, ways: Sequence[str]
 ) -> Generator[TopoDS_Shape | None]:
-    """What each way of offsetting leaves of a solid inside a skin; None where one fails, crashes or does not end.
+    """Solids that each way of offsetting leaves inside a skin; None where one fails, crashes or does not end.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _offset(solid: TopoDS_Solid, by: float, join: GeomAbs_JoinType, together: bo
 
 
 def _place(shape: TopoDS_Shape) -> TopLoc_Location:
-    """Where a sphere in it has been moved to, or it itself: the kernel seeks a moved sphere's poles where they were."""
+    """Move a surface's sphere for good, for the kernel seeks a moved sphere's poles where they were."""
     for face in parts_of(shape, TopAbs_FACE):
         if any(BRep_Tool.Degenerated_s(as_edge(edge)) for edge in parts_of(face, TopAbs_EDGE)):
             place = TopLoc_Location()
@@ -205,7 +205,7 @@ def _solid_of(shell: TopoDS_Shape) -> TopoDS_Solid:
 
 
 def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, depths: Depths) -> list[TopoDS_Solid]:
-    """What is left of a solid less a skin on the inner side of all its faces but the openings.
+    """Offset a solid inwards by a skin on all its faces but the openings.
 
     Parameters
     ----------

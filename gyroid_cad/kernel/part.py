@@ -66,7 +66,7 @@ class Part:
     box: Box | None = None
 
     def contains(self, points: Floats) -> Booleans:
-        """Which points, shape (n, 3), lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
+        """Mask of the points, shape (n, 3), that lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
         inside = np.zeros(len(points), dtype=bool)
         for solid in self.solids:
             classifier = BRepClass3d_SolidClassifier(solid)

@@ -40,7 +40,7 @@ _BREP_MARK, _BREP_HEADER = b"CASCADE Topology V", 400
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What the kernel finds a shape to be.
+    """Measures of a shape, as the kernel finds them.
 
     Attributes
     ----------

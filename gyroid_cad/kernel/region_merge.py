@@ -1,4 +1,4 @@
-"""What was found region by region put together: what is shared made one, the part's boundary split to match."""
+"""Merge of the regions' pieces: what they share made one, the part's boundary split to match."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 
 
 class Joining:
-    """What was found in the regions put together, and the part's boundary split to match."""
+    """Pieces of all regions put together, and the part's boundary split to match."""
 
     def __init__(self, task: Task, found: Sequence[Found]) -> None:
         self.task = task
@@ -205,7 +205,7 @@ class Joining:
         self.builder.Range(edge, *limits)
 
     def _take_over_vertices(self, fuse: BOPAlgo_Builder) -> None:
-        """What vertices have become, with the part's boundary split."""
+        """Take over the vertices as they are with the part's boundary split."""
         for number, vertex in self.vertices.items():
             for image in modified(fuse, vertex):
                 self.vertices[number] = as_vertex(image)
@@ -241,7 +241,7 @@ class Joining:
         on_boundary: dict[int, TopoDS_Edge],
         fuse: BOPAlgo_Builder | None,
     ) -> list[TopoDS_Edge]:
-        """What an edge of a piece has become, in the order and the way that the piece runs through it."""
+        """Edges that an edge of a piece has become, in the order and the way that the piece runs through it."""
         if fuse is None or index not in on_boundary:
             return [as_edge(self._lattice_edge(number, self.found[number].edges[index]).Oriented(way))]
         whole = on_boundary[index]

@@ -1,4 +1,4 @@
-"""What a region's faces of a lattice leave in a part, described so that it can be sent to another process.
+"""Split of a region's lattice faces by a part, described so that it can be sent to another process.
 
 Edges and vertices of the lattice go by their numbers: the other process has them. Only sections are sent as shapes.
 """
@@ -53,7 +53,7 @@ NEW = -1
 
 
 class Task:
-    """What is to be split, with numbers for faces, edges and vertices on which all processes agree."""
+    """Work to be split, with numbers for faces, edges and vertices on which all processes agree."""
 
     def __init__(self, part: Part, faces: Sequence[TopoDS_Shape]) -> None:
         self.part = part
@@ -113,7 +113,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is left of a region's faces in the part.
+    """Pieces of a region's faces that are left in the part.
 
     Attributes
     ----------

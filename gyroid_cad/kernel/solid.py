@@ -106,7 +106,7 @@ def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
 
 
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """The same topology and geometry under a handle of its own: moving one does not move the other."""
+    """Another handle on a shape's topology and geometry: moving one does not move the other."""
     casts = {TopAbs_SOLID: as_solid, TopAbs_SHELL: as_shell, TopAbs_COMPOUND: as_compound}
     return casts[shape.ShapeType()](shape.Located(TopLoc_Location()))
 

@@ -30,6 +30,7 @@ from OCP.TopAbs import (
 )
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, ShapeList, as_edge, as_face
@@ -41,13 +42,13 @@ __all__ = [
     "bounded_solids",
     "changes",
     "compound_of",
+    "connected_shells",
     "general_fuse",
     "inner_point",
     "inner_sides",
     "lies_in",
     "modified",
     "running_like",
-    "shells_of",
     "solids_of",
     "split",
 ]
@@ -61,7 +62,7 @@ _BOTH_WAYS = {TopAbs_FORWARD, TopAbs_REVERSED}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
-    """What is left of a part and of faces that were split against each other.
+    """Pieces of a part's boundary and of faces that were split against each other.
 
     Attributes
     ----------
@@ -161,11 +162,11 @@ def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
     users = _users(faces)
     if any({use.orientation for use in uses} != _BOTH_WAYS or len(uses) != 2 for uses in users):
         raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
-    shells = [_shell([faces[index] for index in group]) for group in _connected(len(faces), users)]
+    shells = [_shell([faces[index] for index in group]) for group in _grouped(len(faces), users)]
     return _solids(shells)
 
 
-def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
+def connected_shells(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
     """Faces in shells that are connected by edges, closed or not.
 
     Parameters
@@ -174,13 +175,13 @@ def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
         Oriented alike.
     """
     users = _users(faces)
-    groups = _connected(len(faces), users)
+    groups = _grouped(len(faces), users)
     opened = {use.face for uses in users for use in uses if len(uses) != 2}
     return [_shell([faces[index] for index in group], opened.isdisjoint(group)) for group in groups]
 
 
 def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[bool]:
-    """Which pieces of the part's boundary lie on the inner side of the lattice faces they meet.
+    """Find the pieces of the part's boundary that lie on the inner side of the lattice faces they meet.
 
     Two faces of a solid run through their common edge in opposite ways: so a piece of the boundary is wanted if it
     runs against the lattice face along the edge they share. Across the part's own edges nothing changes.
@@ -270,24 +271,13 @@ def _users(faces: Sequence[TopoDS_Face]) -> list[list[_Use]]:
     return users
 
 
-def _connected(count: int, users: list[list[_Use]]) -> list[list[int]]:
+def _grouped(count: int, users: list[list[_Use]]) -> list[list[int]]:
     """Faces in groups that are connected by edges."""
-    beside: list[set[int]] = [set() for _ in range(count)]
-    for uses in users:
-        for use in uses:
-            beside[use.face].update(other.face for other in uses)
-    groups, seen = [], [False] * count
-    for start in range(count):
-        if seen[start]:
-            continue
-        seen[start], group = True, [start]
-        for face in group:
-            fresh = [other for other in beside[face] if not seen[other]]
-            group += fresh
-            for other in fresh:
-                seen[other] = True
-        groups.append(group)
-    return groups
+    pairs = np.array([(uses[0].face, use.face) for uses in users for use in uses], dtype=np.int64).reshape(-1, 2)
+    groups: dict[int, list[int]] = {}
+    for face, label in enumerate(connected(count, *pairs.T).tolist()):
+        groups.setdefault(label, []).append(face)
+    return list(groups.values())
 
 
 def _shell(faces: Iterable[TopoDS_Face], closed: bool = True) -> TopoDS_Shell:
@@ -343,7 +333,7 @@ def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
 
 
 def modified(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    """What a shape has become in a general fuse: itself, if nothing crossed it."""
+    """Shapes that a shape has become in a general fuse: itself, if nothing crossed it."""
     if fuse.IsDeleted(shape):
         return []
     # Taken off one by one: to iterate over a list of the kernel's ends in an exception, a hundred times as slow.
@@ -382,7 +372,7 @@ def running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Con
 
 
 def lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
-    """Whether a face that crosses a solid's boundary nowhere lies in it."""
+    """Tell whether a face that crosses a solid's boundary nowhere lies in it."""
     classifier.Perform(inner_point(as_face(face), context), _CLASSIFYING_TOLERANCE)
     return bool(classifier.State() == TopAbs_IN)
 

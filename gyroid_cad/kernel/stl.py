@@ -71,7 +71,7 @@ def write_stl(
 def meshed(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """The same triangles as arrays, for other formats.
+    """Triangles of a shape as arrays, for formats other than STL.
 
     They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
     Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
@@ -128,7 +128,7 @@ def _triangle_count(face: TopoDS_Shape) -> int:
 
 
 def diagonal(shape: TopoDS_Shape) -> float:
-    """Of the box round a shape, a little larger than need be, in mm."""
+    """Diagonal of the box round a shape, a little longer than need be, in mm."""
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
     return float(box.CornerMin().Distance(box.CornerMax()))

@@ -59,7 +59,7 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
 
 
 def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
-    """What the kernel holds, read back into arrays."""
+    """Arrays of a B-spline surface that the kernel holds."""
     n, m = surface.NbUPoles(), surface.NbVPoles()
     poles = [[surface.Pole(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
     weights = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]

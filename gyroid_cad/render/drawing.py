@@ -229,7 +229,7 @@ def _pixels(scene: _Scene, seen: Integers, width: int, axes: Floats) -> Bytes:
 
 
 def _ink(scene: _Scene, seen: Integers, hit: Integers, width: int) -> Singles:
-    """How much darker each sample is for the lines it lies on, from 0 to 1."""
+    """Darkness of each sample for the lines it lies on, from 0 to 1."""
     depth = slopes(scene.corners, scene.corners[..., 2])
     place = np.zeros(len(seen), dtype=np.float32)
     place[hit] = depth.at(seen[hit], *np.divmod(hit, width)[::-1])

@@ -210,7 +210,7 @@ def _joined(parts: Sequence[Facets]) -> Facets:
 
 
 def _corner_normals(corners: Floats, triangles: Integers) -> Floats:
-    """Of each corner, the mean normal of the triangles round it, as far as no sharp edge parts them; (m, 3, 3)."""
+    """Mean normal at each corner of the triangles round it, as far as no sharp edge parts them; (m, 3, 3)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

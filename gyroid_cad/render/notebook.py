@@ -1,4 +1,4 @@
-"""What a notebook shows of a lattice or a filled part: a picture and a small table, which open offline.
+"""Notebook view of a lattice or a filled part: a picture and a small table, which open offline.
 
 IPython asks objects for ``_repr_mimebundle_`` (its documentation, *Integrating your objects with IPython*). The picture
 stands in the HTML itself, for notebooks, and once more by itself, for what knows no HTML.

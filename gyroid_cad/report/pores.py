@@ -1,4 +1,4 @@
-"""How large the pores are: spheres that fit between the walls, by place and by volume.
+"""Sizes of pores: spheres that fit between the walls, by place and by volume.
 
 The distance to the nearest wall is the radius of the largest sphere round a place that fits. Where it is largest
 nearby, in the middle of a network's nodes, stand the inscribed spheres. By volume, the pore size at a place is the
@@ -175,7 +175,7 @@ def inscribed_spheres(fitted: FittedWall) -> tuple[Floats, Floats, Integers]:
 
 
 def _scene(fitted: FittedWall) -> tuple[_Grid, WallFaces, str]:
-    """Where to look, what bounds the pores, and what there is beyond the block's sides."""
+    """Scene of the pores: the region looked at, the walls, and what there is beyond the block's sides."""
     grading, wall = fitted.spec.grading, fitted.wall
     if grading.uniform:
         return _grid(fitted, 0.0), wall_faces(wall, grading.cell_size), ENDLESS

@@ -95,7 +95,7 @@ class Faces:
         return basis(self.knots, 3, x.ravel(), derivative).reshape(*x.shape, len(self.weights))
 
     def heights(self, which: Integers, u: Floats, v: Floats) -> Floats:
-        """How far points lie on the kept side of every plane, in mm; shape (m, q, 6), infinite for planes not near."""
+        """Height of points over every plane, on its kept side, in mm; shape (m, q, 6), infinite for planes not near."""
         points = self.points(which, u, v)
         heights = _SIGNS * (points[..., AXES] - self.levels[which][:, np.newaxis])
         return np.where(np.isnan(heights), np.inf, heights)
@@ -103,7 +103,7 @@ class Faces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeCrossings:
-    """Where sides of the square cross planes, ordered by face, then side, then along the side.
+    """Crossings of the square's sides with planes, ordered by face, then side, then along the side.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class EdgeCrossings:
 
     @property
     def places(self) -> Floats:
-        """In the square; shape (crossings, 2)."""
+        """Places of the crossings in the square; shape (crossings, 2)."""
         return np.stack(square_points(self.side, self.along), axis=-1)
 
 
@@ -143,7 +143,7 @@ def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:
 
 
 def edge_crossings(faces: Faces) -> EdgeCrossings:
-    """Where the sides of faces cross the planes near them.
+    """Find the crossings of faces' sides with the planes near them.
 
     Raises
     ------

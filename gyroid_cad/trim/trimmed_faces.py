@@ -88,7 +88,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CutFace:
-    """What a box leaves of a face.
+    """A face trimmed to a box.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class CutFace:
         return int(self.sections.plane[self.curves[arc.curve]])
 
     def on_edge(self, node: Node, plane: int) -> bool:
-        """Whether a node lies on an edge of the box that is one of a plane's."""
+        """Tell whether a node lies on an edge of the box that is one of a plane's."""
         return plane in self.edges.get(node, ())
 
     def bulge(self, arc: Arc, x: int, y: int) -> float:
@@ -196,7 +196,7 @@ class _Cutting:
     def _edge_points(
         self, curves: list[int]
     ) -> tuple[dict[Node, Floats], dict[Node, tuple[int, int]], list[list[tuple[float, int]]]]:
-        """Where section curves of one face cross each other, on an edge of the box.
+        """Points where section curves of one face cross each other, on an edge of the box.
 
         Their points; the planes that meet there; and for each curve the parameters and numbers of those on it.
         """
@@ -221,7 +221,7 @@ class _Cutting:
 
     @staticmethod
     def _number_near(place: Floats, places: list[Floats], alike: list[bool]) -> int:
-        """Which of the places a place is, found a second time from the other curve through it; or a new number."""
+        """Number of a point that was found before from the other curve through it; or a new number."""
         for number, (other, same) in enumerate(zip(places, alike, strict=True)):
             if same and np.linalg.norm(other - place) < _SAME_PLACE:
                 return number

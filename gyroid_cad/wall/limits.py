@@ -1,4 +1,4 @@
-"""What a lattice may be: how many cells, of what size, with what wall."""
+"""Limits of a lattice: how many cells, of what size, with what wall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the user gives a lattice: checked when it is given, and turned into what is to be built."""
+"""Parameters of a lattice: checked when they are given, and turned into what is to be built."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ class LatticeParameters:
 
     @property
     def uniform(self) -> bool:
-        """Whether every cell is like every other."""
+        """True where every cell is like every other."""
         varying = isinstance(self.thickness, Field) or isinstance(self.density, Field)
         return not varying and self.scale_field is None and self.map is None
 
@@ -186,7 +186,7 @@ class LatticeParameters:
         return _measures(self.cells, self.grading())
 
     def _require_variable(self) -> None:
-        """What can be told of a graded lattice before it is built."""
+        """Check a graded lattice as far as can be before it is built."""
         for name in ("thickness", "scale_field"):
             if isinstance(value := getattr(self, name), float):
                 positive_number(name, value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 
-import cadquery as cq
+import build123d as bd
 import manifold3d
 import numpy as np
 import pytest
@@ -214,7 +214,7 @@ def test_faces_that_cut_a_lattice_or_are_no_lattices_have_the_third_colour() -> 
         draw([facets_of_shape(Lattice((1, 1, 1), 10, 0.8, fit=FitSettings(5), trim="box").solid())], (200, 200))
     )
     assert min(block) > 0.1
-    box = shares(draw([facets_of_shape(cq.Workplane().box(1, 2, 3).val().wrapped)], (100, 100)))
+    box = shares(draw([facets_of_shape(bd.Box(1, 2, 3).wrapped)], (100, 100)))
     assert box == [0, 0, 1]
 
 

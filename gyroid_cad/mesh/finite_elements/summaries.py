@@ -1,4 +1,4 @@
-"""What all elements' measures amount to: extremes, means, histograms, and where the worst is. Summaries add up."""
+"""Summaries of all elements' measures: extremes, means, histograms, and the place of the worst. They add up."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """Of a measure: which end is good, where acceptable ends, and the bins it is counted in."""
+    """Properties of a measure: its good end, its acceptable range, and the bins it is counted in."""
 
     larger_is_better: bool
     bound: float
@@ -119,7 +119,7 @@ class MeasureSummary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quality:
-    """How good the elements of a mesh are.
+    """Quality of the elements of a mesh.
 
     Attributes
     ----------

@@ -124,7 +124,7 @@ def _require_few(steps: Integers, deviation: float) -> None:
 
 
 def _steps_of_edges(wall: Wall, patch_steps: Integers) -> Integers:
-    """Of every edge the more of its two patches'."""
+    """Steps of every edge, the more of its two patches'."""
     steps = np.zeros(wall.complex.edge_count, dtype=np.int64)
     np.maximum.at(steps, wall.complex.patch_edges.ravel(), np.repeat(patch_steps, 4))
     return steps
@@ -172,7 +172,7 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangulation:
-    """How a wall is cut into triangles.
+    """Triangulation of a wall.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ class Triangulation:
 
     @property
     def triangle_count(self) -> int:
-        """Of both faces and the free side walls."""
+        """Count of the triangles of both faces and the side walls."""
         edges = self.edge_steps[self.wall.complex.patch_edges].sum()
         faces = np.sum(2 * (self.patch_steps - 2) ** 2 + 4 * (self.patch_steps - 2)) + edges
         return int(2 * faces + 2 * self.across * self.edge_steps[self.wall.complex.free].sum())

@@ -21,12 +21,12 @@ _TOML_ENDING = ".toml"
     "-o",
     "--output",
     "--screenshot",
-    "picture",
+    "screenshot",
     metavar="FILE.png",
     help="Draw into a file instead of opening a window; no display is needed.",
 )
 @click.option("--quiet", is_flag=True, help="Show no progress.")
-def view_command(picture: str | None, quiet: bool, **given: Any) -> None:
+def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
     """Show a lattice, or a .step, .stp, .brep, .stl or .3mf file, in CadQuery's viewer.
 
     The lattice is described as for "build", by options or in a TOML file; no solid is built unless it is trimmed.
@@ -43,4 +43,4 @@ def view_command(picture: str | None, quiet: bool, **given: Any) -> None:
     named = file is not None and not file.lower().endswith(_TOML_ENDING)
     what = file if named else lattice_of(given)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        view(what, picture, progress)
+        view(what, screenshot, progress)

@@ -102,6 +102,14 @@ def test_the_command_draws_a_trimmed_lattice_from_the_file_that_build_reads(
     assert [path.name for path in tmp_path.iterdir()] == ["lattice.toml"]
 
 
+def test_a_file_may_name_its_picture(tmp_path: Path) -> None:
+    (tmp_path / "lattice.toml").write_text(
+        'cells = [1, 1, 1]\ncell_size = 10\nthickness = 0.8\ncontrol_points = 5\nscreenshot = "cell.png"\n'
+    )
+    assert main(["view", str(tmp_path / "lattice.toml")]) == 0
+    assert covered(tmp_path / "cell.png").any()
+
+
 def test_a_picture_takes_neither_a_display_nor_vtk(tmp_path: Path) -> None:
     run = program("view", *ONE_CELL, "-o", str(tmp_path / "cell.png"))
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")

@@ -9,6 +9,7 @@ import click
 
 from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside
+from gyroid_cad.cli.options import file_paths
 
 __all__ = ["view_command"]
 
@@ -23,6 +24,7 @@ _TOML_ENDING = ".toml"
     "--screenshot",
     "screenshot",
     metavar="FILE.png",
+    shell_complete=file_paths,
     help="Draw into a file instead of opening a window; no display is needed.",
 )
 @click.option("--quiet", is_flag=True, help="Show no progress.")

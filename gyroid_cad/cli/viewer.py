@@ -12,19 +12,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import (
+    BREP,
+    PART_FORMATS,
+    PNG,
+    TRIANGLE_FORMATS,
+    format_of,
+    require_format,
+    require_output,
+)
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.mesh.triangles.files import TRIANGLE_ENDINGS, read_triangles
+from gyroid_cad.mesh.triangles.files import read_triangles
 from gyroid_cad.render.drawing import draw
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles, facets_of_wall
 from gyroid_cad.render.picture import png
 
-__all__ = ["VIEWED_FORMATS", "has_display", "view"]
+__all__ = ["has_display", "view"]
 
-VIEWED_FORMATS = (".step", ".stp", ".brep", *TRIANGLE_ENDINGS)
-PICTURE_ENDING = ".png"
 # Of pictures and windows, in pixels.
 _SIZE = (1000, 800)
 # Facets at a larger angle meet in an edge that is seen, in degrees.
@@ -63,7 +70,7 @@ def view(
         If a file cannot be read, or the picture not be written.
     """
     if picture is not None:
-        _require_picture(picture)
+        require_output(picture, (PNG,))
     if not isinstance(what, Lattice):
         _require_viewed(what)
     if picture is None:
@@ -95,17 +102,9 @@ def has_display() -> bool:
     return True
 
 
-def _require_picture(path: str | os.PathLike[str]) -> None:
-    if Path(path).suffix.lower() != PICTURE_ENDING:
-        raise ParameterError("output", str(path), f"a file name ending in {PICTURE_ENDING}")
-    require_writable(path)
-
-
 def _require_viewed(path: str | os.PathLike[str]) -> None:
-    given = Path(path)
-    if given.suffix.lower() not in VIEWED_FORMATS:
-        raise ParameterError("file", str(path), f"a file ending in {', '.join(VIEWED_FORMATS)}")
-    if not given.is_file():
+    require_format("file", path, PART_FORMATS, "a file ending in ")
+    if not Path(path).is_file():
         raise ParameterError("file", str(path), "a file that exists")
 
 
@@ -123,11 +122,10 @@ def _of_lattice(lattice: Lattice, progress: Progress | None) -> list[Facets]:
 
 
 def _of_file(path: Path) -> list[Facets]:
-    ending = path.suffix.lower()
-    if ending in TRIANGLE_ENDINGS:
+    if format_of(path) in TRIANGLE_FORMATS:
         # Nobody knows of strange triangles that they are closed and the right way round.
         return [facets_of_triangles(*read_triangles(path), closed=False)]
-    if ending == ".brep":
+    if format_of(path) == BREP:
         from gyroid_cad.kernel.reading import read_shape
 
         return [facets_of_shape(read_shape(path))]

@@ -268,7 +268,7 @@ def test_a_file_without_a_face_says_that_there_is_nothing_to_be_seen(
 @pytest.mark.parametrize(
     ("what", "picture", "words"),
     [
-        ("part.igs", None, "file = 'part.igs': expected a file ending in .step, .stp, .brep, .stl, .3mf"),
+        ("part.igs", None, "file = 'part.igs': expected a file ending in .step, .stp, .brep, .stl or .3mf"),
         ("missing.step", None, "file = 'missing.step': expected a file that exists"),
         ("missing.step", "a.jpg", "output = 'a.jpg': expected a file name ending in .png"),
         ("missing.step", "no/a.png", "existing folder"),

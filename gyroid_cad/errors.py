@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from gyroid_cad.former import Moved, former_names
+
 __all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"]
+
+__getattr__ = former_names(__name__, {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}.get)
 
 
 class GyroidError(Exception):

@@ -12,7 +12,8 @@ import trimesh
 from build123d import BuildPart
 
 import gyroid_cad.cq_plugin  # noqa: F401 (adds Workplane.gyroid)
-from gyroid_cad import Cylinder, FitSettings, Lattice, fill, write_volumes
+from gyroid_cad import FitSettings, Lattice, fill, write_volumes
+from gyroid_cad.maps import Cylinder
 from gyroid_cad.bd_objects import Gyroid
 from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.cli.app import main

@@ -1,0 +1,118 @@
+"""Names and modules of before: in this version they go on working, with a warning that says where they are now."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any, NamedTuple
+
+__all__ = ["FORMER_MODULES", "Moved", "former_names", "install_former_modules", "moved_to"]
+
+
+class Moved(NamedTuple):
+    """Where a name is now.
+
+    Attributes
+    ----------
+    home : str
+        Module and name.
+    instead : str
+        What to write instead, if that is not the home.
+    """
+
+    home: str
+    instead: str = ""
+
+
+# Modules of before and those that have their names now; only such as the documentation has shown.
+FORMER_MODULES: Mapping[str, tuple[str, ...]] = {
+    f"gyroid_cad.{former}": tuple(f"gyroid_cad.{module}" for module in modules.split())
+    for former, modules in {
+        "block_maps": "maps",
+        "bounding_cells": "surface.symmetry",
+        "complex": "wall.complex",
+        "exact_wall": "wall.exact",
+        "families": "surface.families",
+        "field_makers": "fields",
+        "fit": "surface.fit surface.fit_report",
+        "fit_settings": "surface.fit",
+        "mesh.hexahedra": "mesh.finite_elements.hexahedra",
+        "mesh.mesh_files": "mesh.finite_elements.files",
+        "mesh.periodic": "mesh.finite_elements.periodic",
+        "mesh.quality": "mesh.finite_elements.quality",
+        "mesh.summaries": "mesh.finite_elements.summaries",
+        "mesh.volume_files": "mesh.iga.files",
+        "mesh.volumes": "mesh.iga.patches",
+        "meshing": "builds.meshes",
+        "patch": "surface.patch",
+        "printers": "printing.printers",
+        "symmetry": "surface.symmetry",
+        "triangles": "builds.triangles",
+        "tube": "surface.families",
+        "weierstrass": "surface.weierstrass",
+    }.items()
+}
+
+
+def former_names(module: str, place_of: Callable[[str], Moved | None], level: int = 2) -> Callable[[str], Any]:
+    """Return a ``__getattr__`` for a module whose names are elsewhere now.
+
+    Parameters
+    ----------
+    module : str
+    place_of : callable
+        Where a name of before is now, or None if there was none.
+    level : int
+        How many calls away the one is that asks for the name; 2 where this is the ``__getattr__`` itself.
+    """
+
+    def lookup(name: str) -> Any:
+        place = place_of(name)
+        if place is None:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        warnings.warn(
+            f"{module}.{name} is now {place.instead or place.home}; the old name goes with this version",
+            DeprecationWarning,
+            stacklevel=level,
+        )
+        where, _, what = place.home.rpartition(".")
+        return getattr(import_module(where), what)
+
+    return lookup
+
+
+def moved_to(homes: Iterable[str]) -> Callable[[str], Moved | None]:
+    """Return what looks for a name in other modules, in turn."""
+
+    def place_of(name: str) -> Moved | None:
+        if not name.startswith("_"):
+            for home in homes:
+                if hasattr(import_module(home), name):
+                    return Moved(f"{home}.{name}")
+        return None
+
+    return place_of
+
+
+class _FormerModules:
+    """Finds modules of before, when nobody else does: each hands out the names of the new ones."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        return ModuleSpec(name, self) if name in FORMER_MODULES else None  # type: ignore[arg-type]
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        return None
+
+    def exec_module(self, module: ModuleType) -> None:
+        names = former_names(module.__name__, moved_to(FORMER_MODULES[module.__name__]))
+        module.__getattr__ = names  # type: ignore[method-assign]
+
+
+def install_former_modules() -> None:
+    """Let modules of before be imported; once."""
+    if not any(isinstance(finder, _FormerModules) for finder in sys.meta_path):
+        sys.meta_path.append(_FormerModules())

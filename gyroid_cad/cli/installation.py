@@ -191,15 +191,15 @@ def _step_returns(folder: Path) -> str:
 
 def _stl_is_closed(folder: Path) -> str:
     from gyroid_cad.mesh.triangles.files import read_triangles
-    from gyroid_cad.mesh.triangles.shells import shells_of
+    from gyroid_cad.mesh.triangles.measures import triangle_measures
 
     lattice, path = _lattice(), folder / "cell.stl"
     lattice.write(path, deviation=_CELL_SIZE / 200)
-    shells = shells_of(*read_triangles(path))
-    error = float(shells.volumes.sum()) / lattice.exact_volume - 1
-    _require(shells.closed, f"{shells.open_edges} edges are open")
+    found = triangle_measures(*read_triangles(path))
+    error = found.volume / lattice.exact_volume - 1
+    _require(found.closed, f"{found.open_edges} edges are open")
     _require(abs(error) < _TRIANGLES_AGREEMENT, f"its volume is off by {error:.1e}")
-    return f"{int(shells.triangles.sum()):,} triangles, closed, volume off by {error:+.1e}"
+    return f"{found.triangles:,} triangles, closed, volume off by {error:+.1e}"
 
 
 def _require(contains: bool, problem: str) -> None:

@@ -20,7 +20,7 @@ from gyroid_cad.kernel.part import Part, measure
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import bounded_solids, compound_of, shells_of
+from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
@@ -201,7 +201,7 @@ class Filling:
 
             with self.timed("join"):
                 if region.surface:
-                    shapes: list[Any] = shells_of([*pieces.inside, *whole])
+                    shapes: list[Any] = connected_shells([*pieces.inside, *whole])
                 elif self.hollow is None or region.fluid:
                     shapes = list(bounded_solids(pieces, whole, wanted_at))
                 else:

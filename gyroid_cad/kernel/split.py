@@ -30,6 +30,7 @@ from OCP.TopAbs import (
 )
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, ShapeList, as_edge, as_face
@@ -41,13 +42,13 @@ __all__ = [
     "bounded_solids",
     "changes",
     "compound_of",
+    "connected_shells",
     "general_fuse",
     "inner_point",
     "inner_sides",
     "lies_in",
     "modified",
     "running_like",
-    "shells_of",
     "solids_of",
     "split",
 ]
@@ -161,11 +162,11 @@ def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
     users = _users(faces)
     if any({use.orientation for use in uses} != _BOTH_WAYS or len(uses) != 2 for uses in users):
         raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
-    shells = [_shell([faces[index] for index in group]) for group in _connected(len(faces), users)]
+    shells = [_shell([faces[index] for index in group]) for group in _grouped(len(faces), users)]
     return _solids(shells)
 
 
-def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
+def connected_shells(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
     """Faces in shells that are connected by edges, closed or not.
 
     Parameters
@@ -174,7 +175,7 @@ def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
         Oriented alike.
     """
     users = _users(faces)
-    groups = _connected(len(faces), users)
+    groups = _grouped(len(faces), users)
     opened = {use.face for uses in users for use in uses if len(uses) != 2}
     return [_shell([faces[index] for index in group], opened.isdisjoint(group)) for group in groups]
 
@@ -270,24 +271,13 @@ def _users(faces: Sequence[TopoDS_Face]) -> list[list[_Use]]:
     return users
 
 
-def _connected(count: int, users: list[list[_Use]]) -> list[list[int]]:
+def _grouped(count: int, users: list[list[_Use]]) -> list[list[int]]:
     """Faces in groups that are connected by edges."""
-    beside: list[set[int]] = [set() for _ in range(count)]
-    for uses in users:
-        for use in uses:
-            beside[use.face].update(other.face for other in uses)
-    groups, seen = [], [False] * count
-    for start in range(count):
-        if seen[start]:
-            continue
-        seen[start], group = True, [start]
-        for face in group:
-            fresh = [other for other in beside[face] if not seen[other]]
-            group += fresh
-            for other in fresh:
-                seen[other] = True
-        groups.append(group)
-    return groups
+    pairs = np.array([(uses[0].face, use.face) for uses in users for use in uses], dtype=np.int64).reshape(-1, 2)
+    groups: dict[int, list[int]] = {}
+    for face, label in enumerate(connected(count, *pairs.T).tolist()):
+        groups.setdefault(label, []).append(face)
+    return list(groups.values())
 
 
 def _shell(faces: Iterable[TopoDS_Face], closed: bool = True) -> TopoDS_Shell:

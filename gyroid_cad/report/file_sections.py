@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,14 +103,14 @@ def _triangles_of(path: Path) -> FileContents:
         "open_edges": found.open_edges,
         "closed": found.closed,
         "manifold": found.manifold,
-        **_sizes(found.low, found.high, found.volume if found.closed else None, found.area),
+        **_sizes(found.low.tolist(), found.high.tolist(), found.volume if found.closed else None, found.area),
     }
     flat = found.area == 0
     facets = None if flat else facets_of_triangles(vertices, triangles, found.closed and found.volume > 0)
     return FileContents(path, measures, facets, triangles=(vertices, triangles))
 
 
-def _sizes(low: tuple[float, ...], high: tuple[float, ...], volume: float | None, area: float) -> dict[str, Any]:
+def _sizes(low: Sequence[float], high: Sequence[float], volume: float | None, area: float) -> dict[str, Any]:
     extent = [b - a for a, b in zip(low, high, strict=True)]
     box = extent[0] * extent[1] * extent[2]
     sizes: dict[str, Any] = {"bounding_box_low": list(low), "bounding_box_high": list(high), "extent": extent}

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.caps import Cap, CapArc, caps_of
 from gyroid_cad.trim.edge_crossings import PLANES, Faces
 from gyroid_cad.trim.sections import Sections
 from gyroid_cad.trim.trimmed_faces import CORNER, RIM, Arc, CutFace, Node, cut_faces
-from gyroid_cad.wall.complex import connected
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["Box", "BoxEdge", "BoxFace", "TrimmedWall", "cut_to_box"]

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
-from gyroid_cad.wall.complex import CellComplex, build_complex, connected
+from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.exact import offset_patches, patch_points, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gyroid_cad.former import Moved, former_names, install_former_modules
+from gyroid_cad.former import METHODS, Moved, former_names, install_former_modules
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
@@ -83,7 +83,9 @@ _MOVED = {
     "surface.fit": ("fit_patch",),
     "surface.fit_report": ("FitReport", "fit_report"),
 }
-_PLACES = {name: Moved(f"gyroid_cad.{module}.{name}") for module, names in _MOVED.items() for name in names} | {
+_PLACES = {
+    **{name: Moved(f"gyroid_cad.{module}.{name}") for module, names in _MOVED.items() for name in names},
+    **{name: Moved(f"gyroid_cad.former.{name}", method) for name, method in METHODS.items()},
     "SoundnessError": Moved("gyroid_cad.errors.SelfIntersectionError", "gyroid_cad.SelfIntersectionError"),
 }
 _former_name = former_names(__name__, _PLACES.get, level=3)

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
-__all__ = ["FORMER_MODULES", "Moved", "former_names", "install_former_modules", "moved_to"]
+__all__ = ["FORMER_MODULES", "METHODS", "Moved", "former_names", "install_former_modules", "moved_to"]
 
 
 class Moved(NamedTuple):
@@ -28,6 +28,13 @@ class Moved(NamedTuple):
     instead: str = ""
 
 
+# Functions of before, below, and the methods that take their place.
+METHODS: Mapping[str, str] = {
+    "write_mesh": "the method write of gyroid_cad.Mesh",
+    "write_mfem_field": "the method write_field of gyroid_cad.VolumePatches",
+    "write_periodic_equations": "the method write of what Lattice.periodic_pairs gives",
+    "write_volumes": "the method write of gyroid_cad.VolumePatches",
+}
 # Modules of before and those that have their names now; only such as the documentation has shown.
 FORMER_MODULES: Mapping[str, tuple[str, ...]] = {
     f"gyroid_cad.{former}": tuple(f"gyroid_cad.{module}" for module in modules.split())
@@ -40,12 +47,13 @@ FORMER_MODULES: Mapping[str, tuple[str, ...]] = {
         "field_makers": "fields",
         "fit": "surface.fit surface.fit_report",
         "fit_settings": "surface.fit",
+        "mesh.abaqus": "mesh.finite_elements.abaqus former",
         "mesh.hexahedra": "mesh.finite_elements.hexahedra",
-        "mesh.mesh_files": "mesh.finite_elements.files",
+        "mesh.mesh_files": "mesh.finite_elements.files former",
         "mesh.periodic": "mesh.finite_elements.periodic",
         "mesh.quality": "mesh.finite_elements.quality",
         "mesh.summaries": "mesh.finite_elements.summaries",
-        "mesh.volume_files": "mesh.iga.files",
+        "mesh.volume_files": "mesh.iga.files former",
         "mesh.volumes": "mesh.iga.patches",
         "meshing": "builds.meshes",
         "patch": "surface.patch",
@@ -56,6 +64,26 @@ FORMER_MODULES: Mapping[str, tuple[str, ...]] = {
         "weierstrass": "surface.weierstrass",
     }.items()
 }
+
+
+def write_mesh(mesh: Any, path: object, pairs: object = None, progress: object = None) -> None:
+    """Write one file of a mesh, as was done before a mesh wrote itself."""
+    mesh.write(path, pairs=pairs, progress=progress)
+
+
+def write_volumes(volumes: Any, path: object) -> None:
+    """Write one file of trivariate patches, as was done before they wrote themselves."""
+    volumes.write(path)
+
+
+def write_mfem_field(volumes: Any, values: object, path: object) -> None:
+    """Write one file of a field on trivariate patches, as was done before they wrote it."""
+    volumes.write_field(values, path)
+
+
+def write_periodic_equations(pairs: Any, file: TextIO, reference: int) -> None:
+    """Write equations to a file that is open, as was done before periodic pairs wrote themselves."""
+    file.writelines(pairs.equations(reference))
 
 
 def former_names(module: str, place_of: Callable[[str], Moved | None], level: int = 2) -> Callable[[str], Any]:
@@ -92,7 +120,7 @@ def moved_to(homes: Iterable[str]) -> Callable[[str], Moved | None]:
         if not name.startswith("_"):
             for home in homes:
                 if hasattr(import_module(home), name):
-                    return Moved(f"{home}.{name}")
+                    return Moved(f"{home}.{name}", METHODS.get(name, ""))
         return None
 
     return place_of

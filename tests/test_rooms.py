@@ -18,7 +18,8 @@ FOLDER = Path(gyroid_cad.__file__).parent
 
 # Each room may import only from rooms above its own; those of one row know nothing of each other.
 ROWS = [
-    ["errors", "version"],
+    ["former", "version"],
+    ["errors"],
     ["common"],
     ["maps", "nurbs"],
     ["fields"],

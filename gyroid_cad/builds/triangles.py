@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
 from dataclasses import asdict, dataclass
 from math import ceil, prod
-from pathlib import Path
 from typing import Any
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import FORMATS
+from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import write_stl
 from gyroid_cad.mesh.triangles.three_mf import write_3mf
@@ -42,8 +42,15 @@ class Triangles:
         with timed(self.seconds, "triangles", progress):
             self.triangulation = triangulated(fitted.wall, deviation)
 
-    def write(self, targets: Sequence[Path], progress: Progress | None = None) -> None:
-        """Write the triangles to each target in the format of its ending.
+    def write(self, *paths: str | os.PathLike[str], progress: Progress | None = None) -> None:
+        """Write files; each path's ending chooses STL (.stl) or 3MF (.3mf). A file appears whole or not at all.
+
+        Parameters
+        ----------
+        *paths : path-like
+            All are checked before any is written.
+        progress : callable, optional
+            Called with (stage, done, total).
 
         Raises
         ------
@@ -51,6 +58,10 @@ class Triangles:
             If a file cannot count so many triangles, or memory would not do for 3MF.
         ExportError
         """
+        targets = require_formats(paths)
+        for path in targets:
+            if FORMATS[path.suffix.lower()] not in TRIANGLE_FORMATS:
+                raise ParameterError("output", str(path), "a name ending in .stl or .3mf for triangles")
         if any(FORMATS[path.suffix.lower()] == "3mf" for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count

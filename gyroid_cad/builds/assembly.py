@@ -13,7 +13,7 @@ import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import FORMATS, require_formats
+from gyroid_cad.common.formats import STEP, require_format, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import KernelError, ParameterError
@@ -100,8 +100,7 @@ class Assembly:
         """
         from gyroid_cad.kernel.assembly import write_assembly
 
-        targets = require_formats(paths)
-        require_assembly_formats(targets)
+        targets = require_formats(paths, [STEP])
         require_memory(self.cells, _BYTES_PER_INSTANCE)
         if not self.cell.valid(progress):
             raise KernelError("the kernel finds the solid of one cell invalid; nothing was written")
@@ -207,7 +206,5 @@ def require_assembly_formats(targets: Sequence[Path]) -> None:
     ------
     ParameterError
     """
-    endings = [ending for ending, form in FORMATS.items() if form == "step"]
     for path in targets:
-        if path.suffix.lower() not in endings:
-            raise ParameterError("output", str(path), f"a name ending in {' or '.join(endings)} for an assembly")
+        require_format("output", path, [STEP], "an assembly: a file name ending in ")

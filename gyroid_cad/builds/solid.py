@@ -12,7 +12,7 @@ import numpy as np
 
 from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import FORMATS, require_meshing, require_schema
+from gyroid_cad.common.formats import BREP, STEP, STL, format_of, require_meshing, require_schema
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
@@ -184,15 +184,15 @@ def write_shape(
     from gyroid_cad.kernel.stl import meshed, write_stl
     from gyroid_cad.mesh.triangles.three_mf import write_3mf
 
-    match FORMATS[path.suffix.lower()]:
-        case "step":
-            write_step(shape, path, schema, parameter_curves=cut)
-        case "brep":
-            write_brep(shape, path)
-        case "stl":
-            write_stl(shape, path, deviation, angle)
-        case _:
-            write_3mf(*meshed(shape, path, deviation, angle), path)
+    form = format_of(path)
+    if form is STEP:
+        write_step(shape, path, schema, parameter_curves=cut)
+    elif form is BREP:
+        write_brep(shape, path)
+    elif form is STL:
+        write_stl(shape, path, deviation, angle)
+    else:
+        write_3mf(*meshed(shape, path, deviation, angle), path)
 
 
 _builds: Cache[LatticeSpec, Build] = Cache()

@@ -8,10 +8,9 @@ from math import ceil, prod
 from typing import Any
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
+from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import write_stl
 from gyroid_cad.mesh.triangles.three_mf import write_3mf
@@ -58,17 +57,14 @@ class Triangles:
             If a file cannot count so many triangles, or memory would not do for 3MF.
         ExportError
         """
-        targets = require_formats(paths)
-        for path in targets:
-            if FORMATS[path.suffix.lower()] not in TRIANGLE_FORMATS:
-                raise ParameterError("output", str(path), "a name ending in .stl or .3mf for triangles")
-        if any(FORMATS[path.suffix.lower()] == "3mf" for path in targets):
+        targets = require_formats(paths, TRIANGLE_FORMATS)
+        if any(format_of(path) is THREE_MF for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count
             require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)))
         for path in targets:
             stage = f"write {path.name}"
-            if FORMATS[path.suffix.lower()] == "3mf":
+            if format_of(path) is THREE_MF:
                 with timed(self.seconds, stage, progress):
                     write_3mf(*indexed_triangles(self.triangulation), path)
             else:

@@ -31,6 +31,7 @@ from gyroid_cad.cli.print_check import print_check_command
 from gyroid_cad.cli.report import report_command
 from gyroid_cad.cli.view import view_command
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
@@ -56,7 +57,7 @@ def commands() -> None:
 
 @commands.command()
 @output_option(
-    ".step, .stp, .brep, .stl or .3mf; may be repeated. For .stl and .3mf of whole patches no solid is built."
+    f"{listed_endings(PART_FORMATS)}; may be repeated. For .stl and .3mf of whole patches no solid is built."
 )
 @lattice_options
 @schema_option

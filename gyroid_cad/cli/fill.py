@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from gyroid_cad.cli.console import print_fill, shown_progress
-from gyroid_cad.cli.lattice_options import surface_option
+from gyroid_cad.cli.lattice_options import density_of, porosity_option, require_one_wall, surface_option
 from gyroid_cad.cli.options import (
     angle_option,
     deviation_option,
@@ -22,13 +22,14 @@ from gyroid_cad.cli.options import (
 )
 from gyroid_cad.common.choices import KINDS, Schema
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 __all__ = ["fill_command"]
 
 
 @click.command("fill")
 @click.argument("part", metavar="PART.step", shell_complete=file_paths)
-@output_option(".step, .stp, .brep, .stl or .3mf; may be repeated.", required=True)
+@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.", required=True)
 @surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(
@@ -39,6 +40,7 @@ __all__ = ["fill_command"]
 @click.option(
     "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a network."
 )
+@porosity_option
 @click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
 @click.option(
     "--opening",
@@ -92,10 +94,14 @@ def fill_command(
     from gyroid_cad.filling.fill import fill
     from gyroid_cad.surface.fit import FitSettings
 
+    if given["kind"] != "surface":
+        require_one_wall(given)
     require_formats(output)
     require_settings((1, 1, 1), schema, deviation, angle)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         faces = [_face(opening) for opening in openings]
+        given["density"] = density_of(given)
+        del given["porosity"]
         filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
         filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
     summary = filled.report.as_dict()

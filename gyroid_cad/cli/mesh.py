@@ -13,13 +13,14 @@ from gyroid_cad.cli.console import print_mesh, print_table, print_volumes, shown
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options
 from gyroid_cad.cli.options import json_option, one_of, output_option, quiet_option
 from gyroid_cad.common.files import file_sizes, require_distinct
+from gyroid_cad.common.formats import MESH_FORMATS, VOLUME_FORMATS, listed_formats, require_formats
 from gyroid_cad.common.progress import timed
 
 __all__ = ["mesh_command", "volumes_command"]
 
 
 @click.command("mesh")
-@output_option(".vtu, .msh (Gmsh), .inp (Abaqus, CalculiX), .cdb (ANSYS), .bdf or .nas (NASTRAN); may be repeated.")
+@output_option(f"{listed_formats(MESH_FORMATS)}; may be repeated.")
 @lattice_options
 @click.option(
     "--subdivisions", type=int, metavar="N", help="Elements along each side of a patch, of 24 a gyroid's cell."
@@ -123,7 +124,7 @@ def mesh_command(
 
 
 @click.command("volumes")
-@output_option(".mesh (MFEM NURBS mesh v1.0), .xml (G+Smo multipatch), .json or .npz; may be repeated.")
+@output_option(f"{listed_formats(VOLUME_FORMATS)}; may be repeated.")
 @lattice_options
 @click.option(
     "--degree",
@@ -145,12 +146,11 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
     gyroid-cad volumes -o cell.mesh -o cell.xml --cells 1 1 1 --cell-size 10 --density 0.3 --degree 3
     """
     start = time.perf_counter()
-    from gyroid_cad.mesh.iga.files import require_volume_file
 
     lattice = lattice_of(given)
     if not output:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    require_distinct(output, require_volume_file)
+    require_formats(output, VOLUME_FORMATS)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.fitted(progress)
         with timed({}, "volumes", progress):

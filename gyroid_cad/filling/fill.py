@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
@@ -169,7 +169,7 @@ class Filled:
         limit = usual if deviation is None else finite_number("deviation", deviation)
         require_settings((1, 1, 1), schema, limit, angle)
         for path in targets:
-            if not self.report.closed and FORMATS[path.suffix.lower()] in TRIANGLE_FORMATS:
+            if not self.report.closed and format_of(path) in TRIANGLE_FORMATS:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
@@ -293,8 +293,11 @@ def _described(
         made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
+            name, given = ("thickness", thickness) if density is None else ("density", density)
             raise ParameterError(
-                "thickness", made.max_thickness, f"less than the part's smallest extent, {smallest:.6g} mm"
+                name,
+                given,
+                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
             )
         return made
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.common.files import replacing, require_distinct, require_writable
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import ABAQUS, require_formats
 from gyroid_cad.mesh.finite_elements.data import MeshData
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.complex import CellComplex
@@ -22,7 +21,6 @@ __all__ = ["PeriodicPairs", "periodic_pairs"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_EQUATIONS_ENDING = ".inp"
 # Of what a pair's translation may be off by, in parts of the mesh's size: rounding leaves 1e-15.
 _SAME_PLACE = 1e-10
 
@@ -78,7 +76,7 @@ class PeriodicPairs:
         ------
         ParameterError, ExportError
         """
-        for target in require_distinct(paths, _require_equations):
+        for target in require_formats(paths, [ABAQUS]):
             with replacing(target) as temporary, temporary.open("w", encoding="ascii") as file:
                 file.writelines(self.equations(reference))
 
@@ -91,12 +89,6 @@ class PeriodicPairs:
                 terms = [(second + 1, 1.0), (first + 1, -1.0), *([(reference, -blocks[axis])] if blocks[axis] else [])]
                 line = ",".join(f"{node},{axis + 1},{factor:g}" for node, factor in terms)
                 yield f"{len(terms)}\n{line}\n"
-
-
-def _require_equations(path: str | os.PathLike[str]) -> Path:
-    if Path(path).suffix.lower() != _EQUATIONS_ENDING:
-        raise ParameterError("output", str(path), f"a file name ending in {_EQUATIONS_ENDING}")
-    return require_writable(path)
 
 
 def periodic_pairs(mesh: MeshData, cell_size: float) -> PeriodicPairs:

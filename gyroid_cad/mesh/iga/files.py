@@ -16,20 +16,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.common.checks import finite_numbers
-from gyroid_cad.common.files import replacing, require_distinct, require_writable
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import (
+    GISMO,
+    JSON,
+    MFEM,
+    MFEM_FIELD,
+    NPZ,
+    VOLUME_FORMATS,
+    Format,
+    require_format,
+    require_formats,
+)
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.iga.data import BOUNDARY_PARTS, FACE_CORNERS, VolumeData
 from gyroid_cad.version import __version__
 
-__all__ = [
-    "VOLUME_FORMATS",
-    "require_volume_file",
-    "write_field_files",
-    "write_volume_files",
-]
+__all__ = ["write_field_files", "write_volume_files"]
 
-FIELD_ENDING = ".gf"
 # MFEM's numbers of shapes (Geometry::Type).
 _SQUARE, _CUBE = 3, 5
 _ROWS_AT_ONCE = 4096
@@ -49,19 +53,6 @@ _ARRAYS = (
 )
 
 
-def require_volume_file(path: str | os.PathLike[str]) -> Path:
-    """Check, before any work is done, that trivariate patches can be written to ``path``.
-
-    Raises
-    ------
-    ParameterError
-        If its ending is none of VOLUME_FORMATS, or a file cannot be put there.
-    """
-    if Path(path).suffix.lower() not in VOLUME_FORMATS:
-        raise ParameterError("output", str(path), f"a file name ending in {', '.join(VOLUME_FORMATS)}")
-    return require_writable(path)
-
-
 def write_volume_files(
     volumes: VolumeData, paths: Sequence[str | os.PathLike[str]], progress: Progress | None = None
 ) -> None:
@@ -71,9 +62,10 @@ def write_volume_files(
     ------
     ParameterError, ExportError
     """
-    for target in require_distinct(paths, require_volume_file):
+    for target in require_formats(paths, VOLUME_FORMATS):
+        form = require_format("output", target, VOLUME_FORMATS)
         with timed({}, f"write {target.name}", progress), replacing(target) as temporary:
-            VOLUME_FORMATS[target.suffix.lower()](volumes, temporary)
+            _WRITERS[form](volumes, temporary)
 
 
 def write_field_files(volumes: VolumeData, values: ArrayLike, paths: Sequence[str | os.PathLike[str]]) -> None:
@@ -84,17 +76,11 @@ def write_field_files(volumes: VolumeData, values: ArrayLike, paths: Sequence[st
     ParameterError, ExportError
     """
     field = finite_numbers("values", values, "a finite number for each control point", (len(volumes.control_points),))
-    for target in require_distinct(paths, _require_field_file):
+    for target in require_formats(paths, [MFEM_FIELD]):
         with replacing(target) as temporary, temporary.open("w", encoding="ascii") as file:
             file.write("FiniteElementSpace\nFiniteElementCollection: NURBS\nVDim: 1\nOrdering: 0\n\nNURBS_patches\n")
             for numbers in volumes.patch_points:
                 file.write(_lines(_u_fastest(field[numbers])[:, np.newaxis]))
-
-
-def _require_field_file(path: str | os.PathLike[str]) -> Path:
-    if Path(path).suffix.lower() != FIELD_ENDING:
-        raise ParameterError("output", str(path), f"a file name ending in {FIELD_ENDING}")
-    return require_writable(path)
 
 
 def _write_mfem(volumes: VolumeData, path: Path) -> None:
@@ -206,11 +192,11 @@ def _write_npz(volumes: VolumeData, path: Path) -> None:
         )
 
 
-VOLUME_FORMATS: dict[str, Callable[[VolumeData, Path], None]] = {
-    ".mesh": _write_mfem,
-    ".xml": _write_gismo,
-    ".json": _write_json,
-    ".npz": _write_npz,
+_WRITERS: dict[Format, Callable[[VolumeData, Path], None]] = {
+    MFEM: _write_mfem,
+    GISMO: _write_gismo,
+    JSON: _write_json,
+    NPZ: _write_npz,
 }
 
 

@@ -11,9 +11,10 @@ the CAD kernel nor CadQuery nor build123d. Maps of space are in :mod:`gyroid_cad
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
-from gyroid_cad.former import METHODS, Moved, former_names, install_former_modules
+from gyroid_cad.former import METHODS, FormerModules, Moved, former_name
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
@@ -88,8 +89,8 @@ _PLACES = {
     **{name: Moved(f"gyroid_cad.former.{name}", method) for name, method in METHODS.items()},
     "SoundnessError": Moved("gyroid_cad.errors.SelfIntersectionError", "gyroid_cad.SelfIntersectionError"),
 }
-_former_name = former_names(__name__, _PLACES.get, level=3)
-install_former_modules()
+if not any(isinstance(finder, FormerModules) for finder in sys.meta_path):
+    sys.meta_path.append(FormerModules())
 
 
 def __getattr__(name: str) -> Any:
@@ -98,7 +99,7 @@ def __getattr__(name: str) -> Any:
     for module, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"gyroid_cad.{module}"), name)
-    return _former_name(name)
+    return former_name(__name__, name, _PLACES.get(name))
 
 
 def __dir__() -> list[str]:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from gyroid_cad.former import Moved, former_names
+from typing import Any
+
+from gyroid_cad.former import Moved, former_name
 
 __all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"]
 
-__getattr__ = former_names(__name__, {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}.get)
+_MOVED = {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}
+
+
+def __getattr__(name: str) -> Any:
+    return former_name(__name__, name, _MOVED.get(name))
 
 
 class GyroidError(Exception):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, NamedTuple, TextIO
 
-__all__ = ["FORMER_MODULES", "METHODS", "Moved", "former_names", "install_former_modules", "moved_to"]
+__all__ = ["FORMER_MODULES", "METHODS", "FormerModules", "Moved", "former_name", "place_in"]
 
 
 class Moved(NamedTuple):
@@ -86,61 +85,49 @@ def write_periodic_equations(pairs: Any, file: TextIO, reference: int) -> None:
     file.writelines(pairs.equations(reference))
 
 
-def former_names(module: str, place_of: Callable[[str], Moved | None], level: int = 2) -> Callable[[str], Any]:
-    """Return a ``__getattr__`` for a module whose names are elsewhere now.
+def former_name(module: str, name: str, place: Moved | None) -> Any:
+    """Return what a module had under a name, and warn the one who asked its ``__getattr__`` for it.
 
     Parameters
     ----------
-    module : str
-    place_of : callable
-        Where a name of before is now, or None if there was none.
-    level : int
-        How many calls away the one is that asks for the name; 2 where this is the ``__getattr__`` itself.
+    module, name : str
+    place : Moved or None
+        Where it is now; None if the module never had it.
+
+    Raises
+    ------
+    AttributeError
     """
-
-    def lookup(name: str) -> Any:
-        place = place_of(name)
-        if place is None:
-            raise AttributeError(f"module {module!r} has no attribute {name!r}")
-        warnings.warn(
-            f"{module}.{name} is now {place.instead or place.home}; the old name goes with this version",
-            DeprecationWarning,
-            stacklevel=level,
-        )
-        where, _, what = place.home.rpartition(".")
-        return getattr(import_module(where), what)
-
-    return lookup
+    if place is None:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    warnings.warn(
+        f"{module}.{name} is now {place.instead or place.home}; the old name goes with this version",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    where, _, what = place.home.rpartition(".")
+    return getattr(import_module(where), what)
 
 
-def moved_to(homes: Iterable[str]) -> Callable[[str], Moved | None]:
-    """Return what looks for a name in other modules, in turn."""
-
-    def place_of(name: str) -> Moved | None:
-        if not name.startswith("_"):
-            for home in homes:
-                if hasattr(import_module(home), name):
-                    return Moved(f"{home}.{name}", METHODS.get(name, ""))
+def place_in(homes: Iterable[str], name: str) -> Moved | None:
+    """Return the place of a name that one of some modules has now."""
+    if name.startswith("_"):
         return None
+    having = (home for home in homes if hasattr(import_module(home), name))
+    return next((Moved(f"{home}.{name}", METHODS.get(name, "")) for home in having), None)
 
-    return place_of
 
-
-class _FormerModules:
+class FormerModules:
     """Finds modules of before, when nobody else does: each hands out the names of the new ones."""
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        """Answer the import system."""
         return ModuleSpec(name, self) if name in FORMER_MODULES else None  # type: ignore[arg-type]
 
     def create_module(self, spec: ModuleSpec) -> None:
-        return None
+        """Leave it to the import system to make a module."""
 
     def exec_module(self, module: ModuleType) -> None:
-        names = former_names(module.__name__, moved_to(FORMER_MODULES[module.__name__]))
-        module.__getattr__ = names  # type: ignore[method-assign]
-
-
-def install_former_modules() -> None:
-    """Let modules of before be imported; once."""
-    if not any(isinstance(finder, _FormerModules) for finder in sys.meta_path):
-        sys.meta_path.append(_FormerModules())
+        """Give a module the names of those that took its place."""
+        own, homes = module.__name__, FORMER_MODULES[module.__name__]
+        module.__getattr__ = lambda name: former_name(own, name, place_in(homes, name))  # type: ignore[method-assign]

@@ -1,6 +1,10 @@
 """B-splines: curves, surfaces and volumes, their evaluation, quadrature and root finding."""
 
-from gyroid_cad.former import former_names, moved_to
+from typing import Any
 
-# The module of this name had them before it became a room.
-__getattr__ = former_names(__name__, moved_to(["gyroid_cad.nurbs.surface"]))
+from gyroid_cad.former import former_name, place_in
+
+
+def __getattr__(name: str) -> Any:
+    # The module of this name had it, before that became a room.
+    return former_name(__name__, name, place_in(["gyroid_cad.nurbs.surface"], name))

@@ -1,6 +1,10 @@
 """The wall: cell complex, grading, offset control nets, and whether they meet themselves."""
 
-from gyroid_cad.former import former_names, moved_to
+from typing import Any
 
-# The module of this name had them before it became a room.
-__getattr__ = former_names(__name__, moved_to(["gyroid_cad.wall.offset"]))
+from gyroid_cad.former import former_name, place_in
+
+
+def __getattr__(name: str) -> Any:
+    # The module of this name had it, before that became a room.
+    return former_name(__name__, name, place_in(["gyroid_cad.wall.offset"], name))

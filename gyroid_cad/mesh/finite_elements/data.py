@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, ElementType
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS
 from gyroid_cad.wall.complex import CellComplex
@@ -37,7 +38,7 @@ class Surface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshData:
-    """What a mesh consists of, for those who write it: :class:`gyroid_cad.Mesh` is one that writes itself.
+    """Elements that share nodes by number, with their sets, for their writers; :class:`gyroid_cad.Mesh` is public.
 
     Elements come patch by patch, layer by layer from face B to face A, then along u and v.
 
@@ -71,6 +72,18 @@ class MeshData:
         for array in (self.points, self.cells, self.kept):
             if array is not None:
                 array.setflags(write=False)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        n, across = self.subdivisions, f"{self.layers} across the wall" if self.layers else "of the mid-surface"
+        return [
+            ("elements", f"{len(self.cells):,} {self.element.name}: {n} x {n} a patch, {across}"),
+            ("nodes", f"{len(self.points):,}"),
+            ("patches", f"{self.complex.patch_count:,}"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
     @property
     def element_patch(self) -> Integers:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS
 from gyroid_cad.nurbs.volume import NurbsVolume
 
@@ -25,7 +26,7 @@ FACE_CORNERS.setflags(write=False)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VolumeData:
-    """What trivariate patches consist of, for those who write them: see :class:`gyroid_cad.VolumePatches`.
+    """All patches of a wall and how they are connected, for their writers; :class:`gyroid_cad.VolumePatches` is public.
 
     Attributes
     ----------
@@ -71,6 +72,17 @@ class VolumeData:
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        return [
+            ("patches", f"{len(self):,} of degrees {', '.join(map(str, self.degrees))}"),
+            ("control points", f"{len(self.control_points):,}"),
+            ("interfaces", f"{len(self.interfaces):,}"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
     def __len__(self) -> int:
         return len(self.patch_points)

@@ -164,7 +164,9 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
         return {**own, "lattice": lattice_of(given)}
     of_blocks = [name for name in (*PAPER_OPTIONS, "scale_field", "map") if given[name] is not None]
     if of_blocks:
-        raise click.UsageError(f"{listed(of_blocks)} are of a block of cells: with {listed(['cells'])}")
+        raise click.UsageError(
+            f"give {listed(['cells'])} with {listed(of_blocks)}: only a block of cells is scaled or mapped"
+        )
     require_given(given, "cell_size")
     if given["kind"] != "surface":
         require_one_wall(given)

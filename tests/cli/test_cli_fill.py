@@ -12,11 +12,13 @@ import cadquery as cq
 import pytest
 
 from gyroid_cad.cli.app import main
+from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.printing.print_check import print_check
 from gyroid_cad.surface.fit import FitSettings
 
 Captured = pytest.CaptureFixture[str]
@@ -229,11 +231,20 @@ def test_a_printer_checks_what_is_left_of_the_part(capsys: Captured, small: Path
     check = json.loads(done.out)["print_check"]
     assert check["size"] == pytest.approx([3, 3, 3], abs=1e-3)
     assert (check["min_wall"], check["wall"], check["printer"]["key"]) == (0.3, "too thin", "form2")
-    # A network has no wall that is known: it is measured.
-    options[:2] = ["--density", "0.6", "--kind", "network-a"]
     shown = run(capsys, small, "-o", small.with_name("a.brep"), *FILL, *options)
-    assert "places; asked" in shown.out
+    assert "smallest wall" in shown.out
     assert "build volume" in shown.out
+
+
+def test_a_network_that_is_checked_for_a_printer_has_its_walls_measured(small: Path) -> None:
+    network = fill(small, 10, density=0.6, kind="network-a", fit=FitSettings(5))
+    check = print_check(network, "form2", deviation=0.1)
+    assert network.report.min_wall is None
+    assert check.walls_measured > 0
+    with pytest.raises(ParameterError, match=r"kind = 'surface': expected one that is a solid"):
+        print_check(fill(small, 10, kind="surface", fit=FitSettings(5)))
+    with pytest.raises(ParameterError, match="deviation = -1"):
+        print_check(network, "form2", deviation=-1)
 
 
 @pytest.mark.parametrize(

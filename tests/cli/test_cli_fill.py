@@ -55,6 +55,13 @@ def test_the_table_shows_what_it_weighs_before_and_after(capsys: Captured, peg: 
     assert " g of " in done.out
 
 
+@pytest.mark.parametrize("kind", ["sheet", "network-a", "network-b", "channels"])
+def test_every_kind_takes_a_density_from_the_command_line(capsys: Captured, block: Path, kind: str) -> None:
+    done = run(capsys, block, "-o", block.with_name("a.brep"), *FILL, "--density", "0.3", "--kind", kind, "--json")
+    assert done.status == 0, done.err
+    assert json.loads(done.out)["kind"] == kind
+
+
 @pytest.fixture
 def block(tmp_path: Path) -> Path:
     write_step(cq.Workplane().box(6, 5, 7).val().wrapped, tmp_path / "block.step")

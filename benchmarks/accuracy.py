@@ -16,7 +16,8 @@ from benchmarks.subject import CELL_SIZE, THICKNESS, block, block_solid, kernel_
 from benchmarks.timing import Row, plain_table, print_verdicts
 from gyroid_cad.nurbs.surface import gauss_points
 from gyroid_cad.surface.families import USUAL
-from gyroid_cad.surface.fit import FitReport, FitSettings, FittedPatch, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, FittedPatch, fit_patch
+from gyroid_cad.surface.fit_report import FitReport, fit_report
 
 TUBE = USUAL.tube
 

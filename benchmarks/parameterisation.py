@@ -18,7 +18,8 @@ import numpy as np
 
 from benchmarks.timing import Row, plain_table, print_verdicts
 from gyroid_cad.surface.families import SURFACES
-from gyroid_cad.surface.fit import FitReport, FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.fit_report import FitReport, fit_report
 from gyroid_cad.surface.weierstrass import Family
 
 __all__ = ["main"]

@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from gyroid_cad.nurbs.surface import NurbsSurface
     from gyroid_cad.printing.print_check import PrintCheck, print_check
     from gyroid_cad.printing.printers import Printer
-    from gyroid_cad.surface.fit import FitReport, FitSettings, fit_patch, fit_report
+    from gyroid_cad.surface.fit import FitSettings, fit_patch
+    from gyroid_cad.surface.fit_report import FitReport, fit_report
 
 __all__ = [
     "Assembly",
@@ -108,7 +109,8 @@ _HOMES = {
         "smooth_minimum",
     ),
     "filling.fill": ("FillReport", "Filled", "fill"),
-    "surface.fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
+    "surface.fit": ("FitSettings", "fit_patch"),
+    "surface.fit_report": ("FitReport", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
     "maps.space": ("SpaceMap",),
     "mesh.finite_elements.abaqus": ("write_periodic_equations",),

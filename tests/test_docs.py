@@ -19,7 +19,8 @@ from scipy.special import ellipk
 import gyroid_cad
 from gyroid_cad.cli.app import main
 from gyroid_cad.surface.families import SURFACES
-from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.surface.weierstrass import CORNER
 
 ROOT = Path(__file__).parents[1]

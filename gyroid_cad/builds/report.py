@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gyroid_cad.builds.solid import Build
-from gyroid_cad.surface.fit import fit_patch, fit_report
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 
 __all__ = ["LatticeReport", "report_of"]
 

@@ -154,7 +154,8 @@ def fit_report_command(control_points: int, as_json: bool) -> None:
     gyroid-cad fit-report
     gyroid-cad fit-report --control-points 14 --json
     """
-    from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+    from gyroid_cad.surface.fit import FitSettings, fit_patch
+    from gyroid_cad.surface.fit_report import fit_report
 
     reports = {
         "smooth": asdict(fit_report(fit_patch(FitSettings(control_points)))),

@@ -24,7 +24,8 @@ from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_wall
 from gyroid_cad.report.file_sections import FileContents, file_section, read_contents
 from gyroid_cad.report.pores import ChannelSpheres, pores_of
 from gyroid_cad.report.wall_thickness import exact_areas, fitted_areas, wall_thickness
-from gyroid_cad.surface.fit import fit_patch, fit_report
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.version import __version__
 
 __all__ = [

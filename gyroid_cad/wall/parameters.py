@@ -17,7 +17,8 @@ from gyroid_cad.fields.makers import paper_units
 from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
-from gyroid_cad.surface.fit import FitSettings, fit_within
+from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
 from gyroid_cad.wall.fitted import LatticeSpec

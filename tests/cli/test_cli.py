@@ -23,7 +23,8 @@ from gyroid_cad.common import memory
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 
 Captured = pytest.CaptureFixture[str]
 

@@ -19,8 +19,7 @@ from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.space import SpaceMap
 from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, uniform_knots
-from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.surface.fit_settings import MOST_CONTROL_POINTS
+from gyroid_cad.surface.fit import MOST_CONTROL_POINTS, FitSettings, fit_patch
 from gyroid_cad.wall import refit as refit_module
 from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.exact import offset_patches

@@ -14,7 +14,15 @@ if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import Assembly, AssemblyReport
     from gyroid_cad.builds.meshes import mesh_quality
     from gyroid_cad.builds.triangles import TriangleReport
-    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SelfIntersectionError
+    from gyroid_cad.errors import (
+        ExportError,
+        FitError,
+        GyroidError,
+        IslandsWarning,
+        KernelError,
+        ParameterError,
+        SelfIntersectionError,
+    )
     from gyroid_cad.fields.field import Field
     from gyroid_cad.fields.makers import (
         between_planes,
@@ -56,6 +64,7 @@ __all__ = [
     "FitReport",
     "FitSettings",
     "GyroidError",
+    "IslandsWarning",
     "KernelError",
     "Lattice",
     "LatticeReport",
@@ -94,7 +103,15 @@ __all__ = [
 _HOMES = {
     "builds.assembly": ("Assembly", "AssemblyReport"),
     "maps.block": ("Bend", "Cylinder", "Sphere", "Twist"),
-    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"),
+    "errors": (
+        "ExportError",
+        "FitError",
+        "GyroidError",
+        "IslandsWarning",
+        "KernelError",
+        "ParameterError",
+        "SelfIntersectionError",
+    ),
     "fields.field": ("Field",),
     "fields.makers": (
         "between_planes",

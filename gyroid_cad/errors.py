@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-__all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"]
+__all__ = [
+    "ExportError",
+    "FitError",
+    "GyroidError",
+    "IslandsWarning",
+    "KernelError",
+    "ParameterError",
+    "SelfIntersectionError",
+]
 
 
 class GyroidError(Exception):
@@ -102,6 +110,10 @@ class KernelError(GyroidError, RuntimeError):
 
 class ExportError(GyroidError, OSError):
     """A file that could not be written; nothing was left behind and nothing older was touched."""
+
+
+class IslandsWarning(UserWarning):
+    """A lattice that was cut falls into pieces: some were dropped, or are left beside the largest one."""
 
 
 def _shown(value: object) -> str:

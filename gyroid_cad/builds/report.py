@@ -24,8 +24,13 @@ class LatticeReport:
     thickness, min_thickness, max_thickness : float
         Whole wall in mm: its mean over the mid-surface and its extremes.
     density : float
-        Volume fraction: of a cell, or of the mapped block where the lattice is graded.
+        Volume fraction: of a cell, of the mapped block where the lattice is graded, or of what is left of a block
+        that is cut.
     patches, faces, solids : int
+    islands, dropped : int
+        Pieces that a trimmed lattice has besides the largest one, and small ones that were dropped.
+    islands_volume, dropped_volume : float
+        Of either, in mm3.
     control_points : int
         Along each side of a patch.
     valid, closed : bool
@@ -36,7 +41,7 @@ class LatticeReport:
         Lines through the wall in which patches touch without joining.
     volume, volume_exact : float
         In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
-        where the lattice is graded; the latter none of a graded lattice that is cut.
+        where the lattice is graded; the latter without what was dropped, and none of a graded lattice that is cut.
     max_deviation : float
         In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice is graded.
     max_wall_error : float, optional
@@ -59,6 +64,10 @@ class LatticeReport:
     patches: int
     faces: int
     solids: int
+    islands: int
+    islands_volume: float
+    dropped: int
+    dropped_volume: float
     control_points: int
     valid: bool
     closed: bool
@@ -103,6 +112,10 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
         patches=built.patches,
         faces=built.topology.faces,
         solids=built.topology.solids,
+        islands=built.islands.kept,
+        islands_volume=built.islands.kept_volume,
+        dropped=built.islands.dropped,
+        dropped_volume=built.islands.dropped_volume,
         control_points=len(fitted.wall.weights),
         valid=built.valid(),
         closed=built.topology.closed,

@@ -80,6 +80,7 @@ def print_summary(summary: dict[str, Any]) -> None:
         ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
         ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
         ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
+        *([("islands", _islands(summary))] if summary["islands"] or summary["dropped"] else []),
         ("boundary edges, non-manifold edges", f"{summary['boundary_edges']}, {summary['non_manifold_edges']}"),
         ("volume", f"{summary['volume']:.8g} mm3{error}"),
         ("deviation", _deviation(summary)),
@@ -123,7 +124,6 @@ def print_fill(summary: dict[str, Any]) -> None:
     summary : dict
         The report's values, with ``files`` and ``seconds["total"]``.
     """
-    islands = f"{summary['islands']} left, {summary['dropped']} dropped"
     rows = [
         ("kind", f"{summary['kind']}, cells of {summary['cell_size']:g} mm, wall {summary['thickness']:.6g} mm"),
         *([] if summary["min_wall"] is None else [("smallest wall", f"{summary['min_wall']:.6g} mm")]),
@@ -135,7 +135,7 @@ def print_fill(summary: dict[str, Any]) -> None:
         ("volume", f"{summary['volume']:.8g} mm3 of {summary['part_volume']:.8g}, density {summary['density']:.5f}"),
         ("surface", f"{summary['area']:.6g} mm2"),
         *([] if summary["mass"] is None else [("mass", f"{summary['mass']:.4g} g of {summary['part_mass']:.4g} g")]),
-        ("islands", islands),
+        ("islands", _islands(summary)),
         *([("shifted by", f"{summary['shift']} mm: the kernel failed without")] if any(summary["shift"]) else []),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
         ("time", f"{summary['seconds']['total']:.2f} s"),
@@ -210,6 +210,14 @@ def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
     from gyroid_cad.cli.bars import terminal_progress
 
     return terminal_progress()
+
+
+def _islands(summary: dict[str, Any]) -> str:
+    counted = {"left": ("islands", "islands_volume"), "dropped": ("dropped", "dropped_volume")}
+    return ", ".join(
+        f"{summary[count]} {what}" + (f" ({summary[volume]:.4g} mm3)" if summary[count] else "")
+        for what, (count, volume) in counted.items()
+    )
 
 
 def _range(summary: dict[str, Any]) -> str:

@@ -26,6 +26,7 @@ __all__ = [
 _CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
+_NOT_OF_THE_PAPER = (*_OWN_OPTIONS, "cell_size", "map", "trim", "keep_islands")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "help"}
 # Of the files that "build" writes: other commands that take the same lattice pass over them.
@@ -105,6 +106,12 @@ _OPTIONS = (
         "--trim", metavar="SHAPE", help="box: cut to the block of cells, flat sides instead of whole patches."
     ),
     click.option(
+        "--keep-islands",
+        is_flag=True,
+        help="Of a trimmed lattice: keep small pieces that the cut leaves unconnected, of less than a hundredth of "
+        "what a cell holds.",
+    ),
+    click.option(
         "--tolerance",
         type=float,
         metavar="PART",
@@ -177,12 +184,12 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     fit = _fit_settings(given["fit"], given["control_points"])
     surface = chosen_surface(given["surface"])
     if any(given[name] is not None for name in _PAPER_OPTIONS):
-        mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map", "trim") if given[name] is not None]
+        mixed = [name for name in _NOT_OF_THE_PAPER if given[name] not in (None, False)]
         if mixed or given["thickness_factor"] is None:
             options = ", ".join(map(option_name, _PAPER_OPTIONS))
             raise click.UsageError(
                 f"{options} are the paper's units: they need --thickness-factor, and not "
-                + ", ".join(map(option_name, mixed or (*_OWN_OPTIONS, "cell_size", "map", "trim")))
+                + ", ".join(map(option_name, mixed or _NOT_OF_THE_PAPER))
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
         return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], **surface)
@@ -190,7 +197,7 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         raise click.UsageError("Missing option '--cell-size'.")
     if (given["thickness"] is None) == (given["density"] is None):
         raise click.UsageError("give exactly one of --thickness and --density")
-    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
+    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim", "keep_islands")}
     return Lattice(given["cells"], given["cell_size"], **own, **surface, fit=fit)
 
 

@@ -1,4 +1,4 @@
-"""What can go wrong, in words a user can act on: the parameter, its value, what is accepted."""
+"""Errors, in words a user can act on: the parameter, its value, what is accepted."""
 
 from __future__ import annotations
 
@@ -119,5 +119,6 @@ class IslandsWarning(UserWarning):
 def _shown(value: object) -> str:
     try:
         return repr(value)
-    except ValueError:  # a whole number of more digits than Python prints
+    # A whole number of more digits than Python prints, or lists within lists within lists.
+    except (ValueError, RecursionError):
         return f"a {type(value).__name__} too long to print"

@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import prod
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
@@ -14,8 +13,10 @@ from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilat
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
+from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
-
-Corner = tuple[float, float, float]
 
 _LENGTH = "a length in mm, a finite number"
 
@@ -94,7 +93,7 @@ class Lattice(LatticeParameters):
         """
         return self.fitted().wall
 
-    def bounding_box(self) -> tuple[Corner, Corner]:
+    def bounding_box(self) -> tuple[Point, Point]:
         """Lowest and highest corner of the box round the wall, in mm."""
         low, high = (corner.tolist() for corner in self.fitted().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
@@ -141,7 +140,7 @@ class Lattice(LatticeParameters):
     def write(
         self,
         *paths: str | os.PathLike[str],
-        schema: str = "ap214",
+        schema: Schema = "ap214",
         deviation: float | None = None,
         angle: float = 15.0,
         progress: Progress | None = None,
@@ -214,9 +213,8 @@ class Lattice(LatticeParameters):
         return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
-        """Whether the solid must be built for files with these endings: not for triangles of whole patches."""
-        formats = {FORMATS[Path(path).suffix.lower()] for path in paths}
-        return bool(self.trim) or not formats <= set(TRIANGLE_FORMATS)
+        """Tell whether files with these endings need the solid: triangles of whole patches do not."""
+        return bool(self.trim) or any(format_of(path) not in TRIANGLE_FORMATS for path in paths)
 
     def triangles(self, deviation: float | None = None, progress: Progress | None = None) -> Triangles:
         """The triangles behind STL and 3MF files of whole patches; no kernel is asked.
@@ -306,7 +304,7 @@ class Lattice(LatticeParameters):
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
         return periodic_pairs(mesh, self.cell_size)
 
-    def picture(self, size: tuple[int, int] = SIZE, camera: Corner = CAMERA) -> bytes:
+    def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
 
         Parameters
@@ -337,7 +335,7 @@ class Lattice(LatticeParameters):
         return MOST_DRAWN_PATCHES // len(self.minimal_surface.cell)
 
     def _shown(self) -> list[tuple[str, str]]:
-        """What a notebook says of it, beside its picture."""
+        """Rows that a notebook shows beside the picture."""
         rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
         drawn = prod(self.cells) <= self._most_drawn
         # What varies over so many cells would take long to measure.
@@ -365,5 +363,5 @@ class Lattice(LatticeParameters):
         return fitted_wall(self.spec(), progress)
 
     def _deviation(self, given: float | None) -> float:
-        """Of triangles, in mm; the usual one if none is given."""
+        """Largest deviation of triangles, in mm; the usual one if none is given."""
         return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given

@@ -1,4 +1,4 @@
-"""From a lattice's wall to its meshes, checked: whole patches only, and no element turned inside out."""
+"""Meshes of a lattice's wall, checked: whole patches only, and no element turned inside out."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def lattice_volumes(fitted: FittedWall, degree: int) -> VolumePatches:
 
 
 def mesh_quality(mesh: Mesh) -> Quality:
-    """What the elements of a mesh are worth; of quadrilaterals the corners are measured.
+    """Measure the quality of a mesh's elements; of quadrilaterals the corners are measured.
 
     Parameters
     ----------

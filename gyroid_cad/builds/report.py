@@ -1,4 +1,4 @@
-"""What a lattice turned out to be, as plain values."""
+"""Report on a lattice's solid, as plain values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["LatticeReport", "report_of"]
 
 @dataclass(frozen=True, slots=True)
 class LatticeReport:
-    """What was built, and how exactly.
+    """Report on a built lattice: its size, its faces, and how exact they are.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From numbers to a checked solid and its files, stage by stage, timed."""
+"""A checked solid and its files, made stage by stage, timed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import FORMATS, require_meshing, require_schema
+from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.formats import BREP, STEP, STL, format_of, require_meshing, require_schema
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
@@ -115,7 +116,7 @@ class Build:
         return shape, sum(volumes[piece] for piece in kept), len(patches)
 
     def _volume_in_box(self) -> float | None:
-        """Of whole cells, all alike; none where they vary."""
+        """Volume of the wall in whole uniform cells, in mm3; None where they vary."""
         if not self.fitted.spec.grading.uniform:
             return None
         cell = np.unique(self.fitted.wall.patch_net, return_index=True)[1]
@@ -134,7 +135,7 @@ class Build:
         return another_handle(self._shape)
 
     def valid(self, progress: Progress | None = None) -> bool:
-        """Whether the kernel's own check, asked once, finds the solid valid."""
+        """Verdict of the kernel's own check, asked once."""
         if self._valid is None:
             from gyroid_cad.kernel.check import is_valid
 
@@ -143,7 +144,7 @@ class Build:
         return self._valid
 
     def write(
-        self, targets: Sequence[Path], schema: str, deviation: float, angle: float, progress: Progress | None = None
+        self, targets: Sequence[Path], schema: Schema, deviation: float, angle: float, progress: Progress | None = None
     ) -> None:
         """Write the solid to each target in the format of its ending.
 
@@ -176,7 +177,9 @@ class Build:
             )
 
 
-def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, angle: float, cut: bool = False) -> None:
+def write_shape(
+    shape: KernelShape, path: Path, schema: Schema, deviation: float, angle: float, cut: bool = False
+) -> None:
     """Write a shape, whose faces may have been cut, in the format of the path's ending.
 
     Raises
@@ -185,18 +188,18 @@ def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, a
     """
     from gyroid_cad.kernel.brep import write_brep
     from gyroid_cad.kernel.step import write_step
-    from gyroid_cad.kernel.stl import meshed, write_stl
+    from gyroid_cad.kernel.stl import meshed, write_meshed_stl
     from gyroid_cad.mesh.triangles.three_mf import write_3mf
 
-    match FORMATS[path.suffix.lower()]:
-        case "step":
-            write_step(shape, path, schema, parameter_curves=cut)
-        case "brep":
-            write_brep(shape, path)
-        case "stl":
-            write_stl(shape, path, deviation, angle)
-        case _:
-            write_3mf(*meshed(shape, path, deviation, angle), path)
+    form = format_of(path)
+    if form is STEP:
+        write_step(shape, path, schema, parameter_curves=cut)
+    elif form is BREP:
+        write_brep(shape, path)
+    elif form is STL:
+        write_meshed_stl(shape, path, deviation, angle)
+    else:
+        write_3mf(*meshed(shape, path, deviation, angle), path)
 
 
 _builds: Cache[LatticeSpec, Build] = Cache()
@@ -229,7 +232,7 @@ def build(spec: LatticeSpec, progress: Progress | None = None) -> Build:
 
 
 def require_settings(
-    cells: tuple[int, int, int], schema: str, deviation: float | None, angle: float, solid: bool = True
+    cells: tuple[int, int, int], schema: Schema, deviation: float | None, angle: float, solid: bool = True
 ) -> None:
     """Check the settings of files to be written, and that memory will do, before anything is built.
 

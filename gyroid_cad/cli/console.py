@@ -1,4 +1,4 @@
-"""What the terminal shows: tables of what was built and how exactly, and how far the work has come."""
+"""Tables and progress on the terminal."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class Cache(Generic[Key, Value]):
         return len(self._held)
 
     def get(self, key: Key, make: Callable[[], Value]) -> Value:
-        """What is held for a key, or else what is made now."""
+        """Return the value held for a key, or else make it now."""
         if key not in self._held:
             made = make()
             while len(self._held) >= self._most:

@@ -1,4 +1,4 @@
-"""How much memory cells take, and whether there is so much."""
+"""Check of the memory that cells take against the memory that there is."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, finite_numbers, positive_number, three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, Floats, as_field, call_text, compiled_field, derived, shown
@@ -28,11 +29,9 @@ __all__ = [
     "smooth_minimum",
 ]
 
-Point = tuple[float, float, float]
-
 
 def constant(value: float) -> Field:
-    """The same value everywhere; raises ParameterError if it is not a finite number."""
+    """Field of one value everywhere; raises ParameterError if it is not a finite number."""
     number = finite_number("value", value)
     return Field(lambda x, y, z: number, call_text("constant", number), number)
 
@@ -211,7 +210,7 @@ def _offsets(start: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
 
 
 def _distance(start: Floats, unit: Floats | None = None) -> Callable[[Floats, Floats, Floats], Floats]:
-    """From a point, or from the line through it."""
+    """Distance from a point, or from the line through it."""
     across = np.eye(3) if unit is None else np.eye(3) - np.outer(unit, unit)
     return lambda x, y, z: np.linalg.norm(across @ _offsets(start, x, y, z), axis=0)
 
@@ -245,7 +244,7 @@ _CELL = 2
 
 @dataclass(frozen=True, slots=True)
 class PaperUnits:
-    """What the paper's thickness factor and BC length are in millimetres.
+    """The paper's thickness factor and BC length, in millimetres.
 
     Attributes
     ----------

@@ -68,7 +68,7 @@ class Infill:
     endless: bool
 
     def sides(self, distance: Any, contains: Any) -> Integers:
-        """Which patches lie inside a part, outside it, or may be crossed, as :func:`covering.patch_sides` tells."""
+        """Side of a part on which each patch lies, or that it may be crossed, as :func:`covering.patch_sides` tells."""
         samples = np.linspace(-1, 1, SIDE_SAMPLES)
         if self.endless:
             own = patch_points(self.complex, self.grading.cell_size, samples)
@@ -79,11 +79,11 @@ class Infill:
         return sides_of_points(self.complex, points, self.max_thickness / 2, distance, contains)
 
     def offsets(self, points: Floats) -> Floats:
-        """How far points of the part's space lie from an endless mid-surface, in mm."""
+        """Signed distance of points of the part's space from an endless mid-surface, in mm."""
         return periodic_offsets(self.frame, self.grading.cell_size, points, self.grading.surface)
 
     def contains(self, region: Region, points: Floats) -> Booleans:
-        """Which points of the part's space, shape (n, 3), lie in a region, to about 1e-3 cell sizes."""
+        """Mask of the points of the part's space, shape (n, 3), that lie in a region, to about 1e-3 cell sizes."""
         if not self.endless:
             return self._block_holds(region, points)
         if self.grading.uniform:
@@ -191,7 +191,7 @@ def _in_frame(value: float | Field | None, frame: Frame) -> float | Field | None
 
 
 def _moved(error: SelfIntersectionError, frame: Frame) -> SelfIntersectionError:
-    """The same, with its place in the part's space."""
+    """Move an infill to its place in the part's space."""
     x, y, z = frame.placed(np.array(error.place)).tolist()
     kind, given = error.__reduce__()
     parameter, value, _, *rest = given

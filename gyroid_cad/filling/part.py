@@ -1,4 +1,4 @@
-"""From a part and a lattice to the checked solids of what is left, shifting the lattice where the kernel fails."""
+"""Checked solids that a lattice leaves in a part; the lattice is shifted a little where the kernel fails."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
@@ -21,7 +22,7 @@ from gyroid_cad.kernel.part import Part, measure
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import bounded_solids, compound_of, shells_of
+from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
@@ -30,7 +31,6 @@ from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, fir
 __all__ = ["Filling", "Made", "Outcome", "without_islands"]
 
 Floats = NDArray[np.float64]
-Point = tuple[float, float, float]
 
 # Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
 _BOUNDARY_SPACING = 1 / 12
@@ -51,7 +51,7 @@ class Made:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What filling gave.
+    """Solids that filling gave, and how they came about.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filling:
-    """What stays the same however the lattice is shifted.
+    """A part to be filled: all that stays the same however the lattice is shifted.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Filling:
 
     @property
     def core(self) -> Part:
-        """What is filled: the part, or what its skin leaves of it."""
+        """The part that is filled: the whole one, or what its skin leaves of it."""
         return self.part if self.hollow is None else self.hollow.core
 
     @property
@@ -151,7 +151,7 @@ class Filling:
         return Outcome(domains, infill, shift, cut, whole, by_sections)
 
     def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
-        """Of a box, whose sides are planes: cut without the kernel."""
+        """Fill a box, whose sides are planes, without the kernel's booleans."""
 
         box = self.core.box
         assert box is not None
@@ -204,7 +204,7 @@ class Filling:
 
             with self.timed("join"):
                 if region.surface:
-                    shapes: list[Any] = shells_of([*pieces.inside, *whole])
+                    shapes: list[Any] = connected_shells([*pieces.inside, *whole])
                 elif self.hollow is None or region.fluid:
                     shapes = list(bounded_solids(pieces, whole, wanted_at))
                 else:
@@ -278,7 +278,7 @@ def _size(made: Made) -> float:
 
 
 def _patches_of(left: TrimmedWall) -> tuple[int, int]:
-    """How many patches a box cuts, and how many it leaves whole."""
+    """Count the patches that a box cuts, and those that it leaves whole."""
     cut = {
         face.patch
         for face in left.faces

@@ -1,4 +1,4 @@
-"""What a part may be filled with: regions of space between offsets of the mid-surface."""
+"""Regions of space between offsets of the mid-surface, with which a part may be filled."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.choices import KINDS, Kind
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.limits import require_density, require_one, require_thickness
 
-__all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
+__all__ = ["CHANNELS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
-SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS = ("sheet", "network-a", "network-b", "channels", "surface")
+SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +43,14 @@ class Region:
     fluid: bool = False
 
     def contains(self, offsets: Floats, half_thickness: Floats) -> Booleans:
-        """Which offsets, in mm, lie between, where the half wall is so many mm."""
+        """Mask of the offsets, in mm, that lie in the region where the wall's half thickness is so many mm."""
         low = -np.inf if self.lowest is None else self.lowest * half_thickness
         high = np.inf if self.highest is None else self.highest * half_thickness
         return np.asarray((offsets > low) & (offsets < high))
 
     @property
     def sides(self) -> list[tuple[int, bool]]:
-        """Which of the wall's faces, 0 or 1, bound it, and whether against the common normal."""
+        """The wall's faces, 0 or 1, that bound the region, each with whether it runs against the common normal."""
         if self.surface:
             return [(1, False)]
         below = [] if self.lowest is None else [(int(self.lowest >= 0), True)]
@@ -73,14 +74,13 @@ class Regions:
 
 
 def regions_of(
-    kind: str, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw
+    kind: Kind, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw
 ) -> Regions:
     """The regions that a kind is made of.
 
     Parameters
     ----------
-    kind : str
-        One of :data:`KINDS`.
+    kind : {"sheet", "network-a", "network-b", "channels", "surface"}
     cell_size : float
         In mm.
     thickness, density : number or field, optional
@@ -129,7 +129,7 @@ def _wall(
     return Regions(regions, density=fraction)
 
 
-def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
+def _network(kind: Kind, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
     low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
     meaning = "the network's volume fraction"
     accepted = f"{meaning}, one number above {low:.5f} and below {high:.5f}"

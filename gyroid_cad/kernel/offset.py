@@ -32,11 +32,11 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.ShapeCustom import ShapeCustom
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
-from OCP.TopTools import TopTools_ListOfShape
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
@@ -52,7 +52,7 @@ _SOLID = "solid.bin"
 def offsets(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, ways: Sequence[str]
 ) -> Generator[TopoDS_Shape | None]:
-    """What each way of offsetting leaves of a solid inside a skin; None where one fails, crashes or does not end.
+    """Solids that each way of offsetting leaves inside a skin; None where one fails, crashes or does not end.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ def work() -> None:
     for way in ways:
         given = _read(Path(folder, _SOLID))
         place = _place(given)
-        solid = TopoDS.Solid_s(given.Moved(place.Inverted()))
-        faces = [TopoDS.Face_s(face) for face in parts_of(solid, TopAbs_FACE)]
+        solid = as_solid(given.Moved(place.Inverted()))
+        faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
         unfinished = Path(folder, f"{way}, unfinished")
         unfinished.touch()
         try:
@@ -144,11 +144,11 @@ def _offset(solid: TopoDS_Solid, by: float, join: GeomAbs_JoinType, together: bo
 
 
 def _place(shape: TopoDS_Shape) -> TopLoc_Location:
-    """Where a sphere in it has been moved to, or it itself: the kernel seeks a moved sphere's poles where they were."""
+    """Move a surface's sphere for good, for the kernel seeks a moved sphere's poles where they were."""
     for face in parts_of(shape, TopAbs_FACE):
-        if any(BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)) for edge in parts_of(face, TopAbs_EDGE)):
+        if any(BRep_Tool.Degenerated_s(as_edge(edge)) for edge in parts_of(face, TopAbs_EDGE)):
             place = TopLoc_Location()
-            BRep_Tool.Surface_s(TopoDS.Face_s(face), place)
+            BRep_Tool.Surface_s(as_face(face), place)
             return place
     return shape.Location()
 
@@ -156,7 +156,7 @@ def _place(shape: TopoDS_Shape) -> TopLoc_Location:
 def _less_thick_skin(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, join: GeomAbs_JoinType
 ) -> TopoDS_Shape:
-    closing = TopTools_ListOfShape()
+    closing = ShapeList()
     for face in openings:
         closing.Append(face)
     maker = BRepOffsetAPI_MakeThickSolid()
@@ -205,7 +205,7 @@ def _solid_of(shell: TopoDS_Shape) -> TopoDS_Solid:
 
 
 def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, depths: Depths) -> list[TopoDS_Solid]:
-    """What is left of a solid less a skin on the inner side of all its faces but the openings.
+    """Offset a solid inwards by a skin on all its faces but the openings.
 
     Parameters
     ----------
@@ -283,4 +283,4 @@ def _moved(shape: TopoDS_Shape, by: gp_Vec) -> TopoDS_Shape:
 
 
 def _solids_in(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
-    return [] if shape.IsNull() else [TopoDS.Solid_s(solid) for solid in parts_of(shape, TopAbs_SOLID)]
+    return [] if shape.IsNull() else [as_solid(solid) for solid in parts_of(shape, TopAbs_SOLID)]

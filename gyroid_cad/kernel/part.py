@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.BRepBndLib import BRepBndLib
-from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.GeomAbs import GeomAbs_Plane
@@ -22,14 +22,16 @@ from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
+from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.trim.box import Box
 
-__all__ = ["Part", "measure", "require_part"]
+__all__ = ["Part", "measure", "require_part", "selected_faces"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -67,7 +69,7 @@ class Part:
     box: Box | None = None
 
     def contains(self, points: Floats) -> Booleans:
-        """Which points, shape (n, 3), lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
+        """Mask of the points, shape (n, 3), that lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
         inside = np.zeros(len(points), dtype=bool)
         for solid in self.solids:
             classifier = BRepClass3d_SolidClassifier(solid)
@@ -106,7 +108,7 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     """
     if shape is None or shape.IsNull():
         raise ParameterError(parameter, shape, "a shape that holds a solid, not an empty one")
-    solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(shape, TopAbs_SOLID))
+    solids = tuple(as_solid(solid) for solid in parts_of(shape, TopAbs_SOLID))
     kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
     if not solids:
         raise ParameterError(parameter, kind, "a closed solid: there is none in it")
@@ -120,24 +122,22 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
         volumes.append(measure(solid)[0])
         if not volumes[-1] > 0:
             raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    corners = np.array(box.Get())
+    low, high = bounding_box(shape)
     divided = _without_seams(shape)
-    solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, corners[:3], corners[3:], sum(volumes), _box_of(solids))
+    solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
+    return Part(divided, solids, low, high, sum(volumes), _box_of(solids))
 
 
 def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
     """The box that the solids are, if they are one box: six planes, and eight corners where a box has them."""
     if len(solids) != 1:
         return None
-    faces = [TopoDS.Face_s(face) for face in parts_of(solids[0], TopAbs_FACE)]
+    faces = [as_face(face) for face in parts_of(solids[0], TopAbs_FACE)]
     if len(faces) != _BOX_FACES or any(BRepAdaptor_Surface(face).GetType() != GeomAbs_Plane for face in faces):
         return None
-    corners = TopTools_IndexedMapOfShape()
+    corners = NumberedShapes()
     TopExp.MapShapes_s(solids[0], TopAbs_VERTEX, corners)
-    places = (BRep_Tool.Pnt_s(TopoDS.Vertex_s(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
+    places = (BRep_Tool.Pnt_s(as_vertex(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
     points = np.array([(place.X(), place.Y(), place.Z()) for place in places])
     normals = [BRepAdaptor_Surface(face).Plane().Axis().Direction() for face in faces]
     directions = np.array([(normal.X(), normal.Y(), normal.Z()) for normal in normals])
@@ -177,7 +177,7 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Corners of the triangles of each meshed face: three arrays of shape (triangles, 3)."""
     for part in parts_of(shape, TopAbs_FACE):
         location = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(part), location)
+        mesh = BRep_Tool.Triangulation_s(as_face(part), location)
         if mesh is None:
             continue
         move = location.Transformation()
@@ -200,3 +200,71 @@ def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> Floats:
         u, v = (u / excess)[:, np.newaxis, np.newaxis], (v / excess)[:, np.newaxis, np.newaxis]
         clouds.append((a[alike] + u * (b - a)[alike] + v * (c - a)[alike]).reshape(-1, 3))
     return np.unique(np.concatenate(clouds), axis=0)
+
+
+_ACCEPTED = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'
+# In parts of the part's largest extent.
+_AS_FAR, _ON_FACE = 1e-6, 1e-3
+
+
+def selected_faces(part: Part, openings: Sequence[Any]) -> list[TopoDS_Face]:
+    """Faces given as themselves, by a selector, or by a point on them.
+
+    Parameters
+    ----------
+    part : Part
+    openings : sequence
+        Faces of the kernel or of a host; strings such as ">Z" for the faces whose centre of area is furthest that way;
+        points (x, y, z) in mm, each for the nearest face.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(openings, str) or not isinstance(openings, Iterable):
+        raise ParameterError("openings", openings, f"a sequence of {_ACCEPTED}")
+    return [face for given in openings for face in _selected(part, given)]
+
+
+def _selected(part: Part, given: Any) -> list[TopoDS_Face]:
+    faces = [as_face(face) for face in parts_of(part.shape, TopAbs_FACE)]
+    if isinstance(given, str):
+        return _furthest(part, faces, given)
+    shape = getattr(given, "wrapped", given)
+    if isinstance(shape, TopoDS_Shape):
+        found = [] if shape.IsNull() else [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
+        if not found:
+            raise ParameterError("openings", given, _ACCEPTED)
+        return found
+    try:
+        point = three_numbers("openings", given)
+    except ParameterError:
+        raise ParameterError("openings", given, _ACCEPTED) from None
+    return [_nearest(part, faces, point)]
+
+
+def _furthest(part: Part, faces: list[TopoDS_Face], selector: str) -> list[TopoDS_Face]:
+    text = selector.strip().upper()
+    if len(text) != 2 or text[0] not in "<>" or text[1] not in "XYZ":
+        raise ParameterError("openings", selector, _ACCEPTED)
+    sign = 1.0 if text[0] == ">" else -1.0
+    reach = sign * np.array([_centre(face)["XYZ".index(text[1])] for face in faces])
+    limit = reach.max() - _AS_FAR * float(np.max(part.high - part.low))
+    return [faces[index] for index in np.flatnonzero(reach >= limit).tolist()]
+
+
+def _centre(face: TopoDS_Face) -> tuple[float, float, float]:
+    area = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, area)
+    centre = area.CentreOfMass()
+    return centre.X(), centre.Y(), centre.Z()
+
+
+def _nearest(part: Part, faces: list[TopoDS_Face], point: Floats) -> TopoDS_Face:
+    vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
+    distances = [BRepExtrema_DistShapeShape(vertex, face).Value() for face in faces]
+    nearest = int(np.argmin(distances))
+    if distances[nearest] > _ON_FACE * float(np.max(part.high - part.low)):
+        shown = tuple(point.tolist())
+        raise ParameterError("openings", shown, f"a point on a face; the nearest is {distances[nearest]:.4g} mm away")
+    return faces[nearest]

@@ -17,7 +17,6 @@ from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
-    TopoDS,
     TopoDS_Compound,
     TopoDS_Edge,
     TopoDS_Face,
@@ -28,6 +27,7 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
+from gyroid_cad.kernel.compat import as_compound, as_face, as_shell, as_solid
 from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, parameter_line
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.wall.offset import SIDES, Wall
@@ -98,7 +98,7 @@ def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
     explorer = TopExp_Explorer(solid, TopAbs_FACE)
     faces: list[TopoDS_Face] = []
     while explorer.More():
-        faces.append(TopoDS.Face_s(explorer.Current()))
+        faces.append(as_face(explorer.Current()))
         explorer.Next()
     counts = len(SIDES) + wall.complex.free[wall.complex.patch_edges].sum(axis=1)
     ends = np.cumsum(counts).tolist()
@@ -106,8 +106,8 @@ def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
 
 
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """The same topology and geometry under a handle of its own: moving one does not move the other."""
-    casts = {TopAbs_SOLID: TopoDS.Solid_s, TopAbs_SHELL: TopoDS.Shell_s, TopAbs_COMPOUND: TopoDS.Compound_s}
+    """Another handle on a shape's topology and geometry: moving one does not move the other."""
+    casts = {TopAbs_SOLID: as_solid, TopAbs_SHELL: as_shell, TopAbs_COMPOUND: as_compound}
     return casts[shape.ShapeType()](shape.Located(TopLoc_Location()))
 
 
@@ -151,7 +151,7 @@ class _Realisation:
     def _patch_faces(self, patch: int) -> list[TopoDS_Face]:
         sides = [k for k in range(4) if self.free[self.patch_edges[patch][k]]]
         return [
-            TopoDS.Face_s(self._make_face(patch, 0).Oriented(TopAbs_REVERSED)),
+            as_face(self._make_face(patch, 0).Oriented(TopAbs_REVERSED)),
             self._make_face(patch, 1),
             *(self._make_side_wall(patch, k) for k in sides),
         ]

@@ -20,28 +20,23 @@ from OCP.StlAPI import StlAPI_Writer
 from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.solid import TOLERANCE
+from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners
+from gyroid_cad.mesh.triangles.triangulation import parting
 
-__all__ = ["diagonal", "meshed", "meshed_by_face", "write_stl"]
-
-# How far triangles that touch without belonging together are parted: a thousandth of the deviation, but
-# enough for the single-precision numbers of STL to tell them apart.
-_PARTING = 1e-3
-_SINGLE_PRECISION_STEPS = 8
-_HEADER_BYTES = 84
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+__all__ = ["diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
 
 
-def write_stl(
+def write_meshed_stl(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
 ) -> None:
     """Mesh a solid (``BRepMesh_IncrementalMesh``) and write it as binary STL, in millimetres.
@@ -71,7 +66,7 @@ def write_stl(
 def meshed(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """The same triangles as arrays, for other formats.
+    """Triangles of a shape as arrays, for formats other than STL.
 
     They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
     Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
@@ -110,25 +105,19 @@ def meshed_by_face(
     with TemporaryDirectory() as folder:
         file = Path(folder) / "triangles.stl"
         _write(copy, file, path)
-        records = np.fromfile(file, _RECORD, offset=_HEADER_BYTES)
-    # Minus zero is zero.
-    corners: NDArray[np.float32] = records["corners"].reshape(-1, 3) + np.float32(0)
-    vertices, numbers = np.unique(corners, axis=0, return_inverse=True)
-    triangles = numbers.reshape(-1, 3).astype(np.int32)
-    # What single precision makes of slivers bounds nothing.
-    slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
+        vertices, triangles, kept = numbered_corners(binary_stl_corners(file))
     # The kernel writes them face by face.
     counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
-    return vertices, triangles[~slivers], np.repeat(np.arange(len(counts)), counts)[~slivers]
+    return vertices, triangles.astype(np.int32), np.repeat(np.arange(len(counts)), counts)[kept]
 
 
 def _triangle_count(face: TopoDS_Shape) -> int:
-    mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(face), TopLoc_Location())
+    mesh = BRep_Tool.Triangulation_s(as_face(face), TopLoc_Location())
     return 0 if mesh is None else int(mesh.NbTriangles())
 
 
 def diagonal(shape: TopoDS_Shape) -> float:
-    """Of the box round a shape, a little larger than need be, in mm."""
+    """Diagonal of the box round a shape, a little longer than need be, in mm."""
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
     return float(box.CornerMin().Distance(box.CornerMax()))
@@ -155,19 +144,15 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     """Move mesh nodes at vertices that coincide but are not the same, each into its own faces."""
     from scipy.spatial import cKDTree
 
-    faces_of_vertex = TopTools_IndexedDataMapOfShapeListOfShape()
+    faces_of_vertex = ShapesOfShape()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex)
-    points = [
-        BRep_Tool.Pnt_s(TopoDS.Vertex_s(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)
-    ]
+    points = [BRep_Tool.Pnt_s(as_vertex(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)]
     positions = np.array([(p.X(), p.Y(), p.Z()) for p in points])
-    distance = max(
-        _PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * float(np.abs(positions).max())
-    )
+    distance = parting(deviation, float(np.abs(positions).max()))
     touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
     for vertex in touching.tolist():
         # A face used by two edges at the vertex is listed twice.
-        faces = {face.__hash__(): TopoDS.Face_s(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
+        faces = {face.__hash__(): as_face(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
         meshes = [_placed_mesh(face) for face in faces.values()]
         inward = np.mean([nodes.mean(axis=0) - positions[vertex] for _, _, nodes in meshes], axis=0)
         step = gp_Vec(*(inward * (distance / np.linalg.norm(inward))).tolist())

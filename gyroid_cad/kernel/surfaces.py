@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_Line
 from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
-from OCP.TColgp import TColgp_Array1OfPnt, TColgp_Array2OfPnt
-from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 from OCP.TopLoc import TopLoc_Location
 
+from gyroid_cad.kernel.compat import IntegerArray, PointArray, PointGrid, RealArray, RealGrid
 from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
 from gyroid_cad.wall.offset import Wall
 
@@ -32,7 +31,7 @@ Floats = NDArray[np.float64]
 def kernel_curve(curve: NurbsCurve) -> Geom_BSplineCurve:
     """The curve as a ``Geom_BSplineCurve``, rational only if its weights differ."""
     knots, multiplicities = kernel_knots(curve.knots)
-    poles = TColgp_Array1OfPnt(1, len(curve.control_points))
+    poles = PointArray(1, len(curve.control_points))
     for i, point in enumerate(curve.control_points.tolist(), 1):
         poles.SetValue(i, gp_Pnt(*point))
     if np.ptp(curve.weights) == 0:
@@ -43,7 +42,7 @@ def kernel_curve(curve: NurbsCurve) -> Geom_BSplineCurve:
 def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
     """The surface as a ``Geom_BSplineSurface``, rational only if its weights differ."""
     n, m = surface.weights.shape
-    poles = TColgp_Array2OfPnt(1, n, 1, m)
+    poles = PointGrid(1, n, 1, m)
     for i, row in enumerate(surface.control_points.tolist(), 1):
         for j, point in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(*point))
@@ -52,7 +51,7 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
     rest = (knots_u, knots_v, multiplicities_u, multiplicities_v, surface.degree_u, surface.degree_v)
     if not surface.rational:
         return Geom_BSplineSurface(poles, *rest)
-    weights = TColStd_Array2OfReal(1, n, 1, m)
+    weights = RealGrid(1, n, 1, m)
     for i, values in enumerate(surface.weights.tolist(), 1):
         for j, value in enumerate(values, 1):
             weights.SetValue(i, j, value)
@@ -60,7 +59,7 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
 
 
 def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
-    """What the kernel holds, read back into arrays."""
+    """Arrays of a B-spline surface that the kernel holds."""
     n, m = surface.NbUPoles(), surface.NbVPoles()
     poles = [[surface.Pole(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
     weights = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
@@ -76,23 +75,23 @@ def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
     return NurbsSurface(points, np.array(weights), knots_u, knots_v)
 
 
-def kernel_knots(vector: Floats) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+def kernel_knots(vector: Floats) -> tuple[RealArray, IntegerArray]:
     """Distinct knots and their multiplicities."""
     return _knot_arrays(tuple(vector.tolist()))
 
 
 @lru_cache(maxsize=64)
-def _knot_arrays(vector: tuple[float, ...]) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+def _knot_arrays(vector: tuple[float, ...]) -> tuple[RealArray, IntegerArray]:
     """Distinct knots and their multiplicities; the kernel copies them, so one pair serves all."""
     values, counts = np.unique(vector, return_counts=True)
-    multiplicities = TColStd_Array1OfInteger(1, len(counts))
+    multiplicities = IntegerArray(1, len(counts))
     for i, count in enumerate(counts.tolist(), 1):
         multiplicities.SetValue(i, count)
     return _reals(values), multiplicities
 
 
-def _reals(values: Floats) -> TColStd_Array1OfReal:
-    array = TColStd_Array1OfReal(1, len(values))
+def _reals(values: Floats) -> RealArray:
+    array = RealArray(1, len(values))
     for i, value in enumerate(values.tolist(), 1):
         array.SetValue(i, value)
     return array

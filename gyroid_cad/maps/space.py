@@ -77,7 +77,7 @@ class SpaceMap:
         object.__setattr__(self, "closed", tuple(self.closed))
 
     def over(self, size: Size) -> SpaceMap:
-        """The same map, whatever the block."""
+        """Return the map itself, whatever the block."""
         return self
 
     def __str__(self) -> str:
@@ -85,7 +85,7 @@ class SpaceMap:
 
 
 def carried(parameter: str, space: SpaceMap, points: Floats, step: float) -> tuple[Floats, Floats]:
-    """Where a map carries points, and its Jacobian there.
+    """Carry points by a map, and give its Jacobian there.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _requested(parameter: str, space: SpaceMap, function: Callable[..., Any], po
 
 
 def _components(parameter: str, space: SpaceMap, given: Any, points: Floats, shape: tuple[int, ...]) -> Floats:
-    """What a map gave, as one array (*shape, n), if it is what a map should give."""
+    """Values of a map as one array (*shape, n), if they are what a map should give."""
     wanted = f"{' x '.join(map(str, shape))} real arrays of shape {points[0].shape} or numbers"
     result = np.empty((*shape, points.shape[1]))
     try:

@@ -21,7 +21,7 @@ FACE_A, FACE_B, FREE_WALLS = "FACE_A", "FACE_B", "FREE_WALLS"
 
 
 def place_count(complex: CellComplex, steps: int) -> int:
-    """How many places there are with so many steps along each side of a patch."""
+    """Count the nodes with so many steps along each side of a patch."""
     inner = steps - 1
     return complex.fan_count + complex.edge_count * inner + complex.patch_count * inner**2
 

@@ -1,4 +1,4 @@
-"""Whether a printer can make a part: does it fit, are its walls thick enough, does resin drain, is it one piece."""
+"""Check of a part against a printer: does it fit, are its walls thick enough, does resin drain, is it one piece."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.measures import measured_walls
-from gyroid_cad.mesh.triangles.shells import Shells, shells_of
+from gyroid_cad.mesh.triangles.measures import TriangleMeasures, measured_walls, triangle_measures
 from gyroid_cad.printing.printers import Printer, printer_named
-from gyroid_cad.wall.complex import CellComplex, connected
+from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.pore_limits import narrowest_opening, pore_limiting_diameter
 
 __all__ = ["PrintCheck", "print_check", "trapped_voids"]
@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PrintCheck:
-    """What a printer makes of a part; lengths in mm.
+    """Verdict on a part for a printer; lengths in mm.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class PrintCheck:
 
     @property
     def fits(self) -> bool:
-        """Whether it fits the build volume, its axes along the printer's in one order or another."""
+        """True if it fits the build volume, its axes along the printer's in one order or another."""
         return self.orientation is not None
 
     @property
@@ -93,7 +93,7 @@ class PrintCheck:
 
     @property
     def drains(self) -> bool | None:
-        """Whether channels are as wide as a drain hole is to be; None if that is not known."""
+        """True if channels are as wide as a drain hole is to be; None if that is not known."""
         return None if self.opening is None else self.opening >= self.printer.min_drain_hole
 
     @property
@@ -208,10 +208,10 @@ def print_check(
         vertices, triangles = read_triangles(part)
     else:
         raise ParameterError("part", part, "a Lattice, an STL or 3MF file, or arrays of vertices and triangles")
-    shells = shells_of(vertices, triangles)
+    found = triangle_measures(vertices, triangles)
     walls = measured_walls(vertices, triangles, _WALLS_MEASURED)
     smallest = float(walls[0]) if len(walls) else None
-    return _checked(chosen, shells.high - shells.low, smallest, len(walls), None, shells)
+    return _checked(chosen, found.high - found.low, smallest, len(walls), None, found)
 
 
 def _check_lattice(
@@ -228,8 +228,8 @@ def _check_lattice(
         from gyroid_cad.kernel.stl import meshed
 
         limit = min(lattice.cell_size / 1000, fitted.min_thickness / 10) if deviation is None else deviation
-        shells = shells_of(*meshed(lattice.solid(progress), "triangles", limit))
-        return _checked(printer, shells.high - shells.low, fitted.min_thickness, 0, opening, shells)
+        found = triangle_measures(*meshed(lattice.solid(progress), "triangles", limit))
+        return _checked(printer, found.high - found.low, fitted.min_thickness, 0, opening, found)
     low, high = fitted.bounding_box()
     count = lattice.triangles(deviation, progress).triangulation.triangle_count
     voids, pieces = trapped_voids(fitted.complex), fitted.complex.component_count
@@ -237,7 +237,7 @@ def _check_lattice(
 
 
 def trapped_voids(complex: CellComplex) -> int:
-    """How many regions of empty space within a lattice of whole patches do not reach outside.
+    """Count the regions of empty space within a lattice of whole patches that do not reach outside.
 
     The wall's surface falls into shells: both faces of every patch, joined across shared edges on either side and,
     where an edge is free, to each other by its side wall. Every piece of the lattice has one shell outside; each
@@ -257,15 +257,15 @@ def _checked(
     min_wall: float | None,
     walls_measured: int,
     opening: float | None,
-    found: Shells | tuple[int, int, int],
+    found: TriangleMeasures | tuple[int, int, int],
 ) -> PrintCheck:
     x, y, z = extents.tolist()
     volume = np.array(printer.build_volume)
     scales = {order: float(np.min(volume / extents[list(order)])) for order in permutations(range(3))}
     # As it stands, if it fits so.
     fitting = next((order for order, scale in scales.items() if scale >= 1 - _ROUNDING), None)
-    if isinstance(found, Shells):
-        counts = found.trapped_voids, found.pieces, found.open_edges, found.inside_out, int(found.triangles.sum())
+    if isinstance(found, TriangleMeasures):
+        counts = found.trapped_voids, found.pieces, found.open_edges, found.inside_out, found.triangles
     else:
         voids, pieces, triangles = found
         counts = voids, pieces, 0, 0, triangles

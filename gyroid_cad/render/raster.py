@@ -150,7 +150,7 @@ def _rows(corners: Floats, width: int, height: int) -> Iterator[tuple[Integers, 
 
 
 def _crossings(corners: Floats, count: Integers, y: Floats) -> tuple[Floats, Floats]:
-    """Where triangles, so many rows of each, begin and end at the heights of their rows."""
+    """Begin and end of triangles, so many rows of each, at the heights of their rows."""
     left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
     for one, other in ((0, 1), (1, 2), (2, 0)):
         # Both triangles at an edge run it upwards, and so find the same place to the last bit.

@@ -1,4 +1,4 @@
-"""How far places are from the wall's faces, and where: samples of the faces, and what the faces do round them."""
+"""Nearest points of the wall's faces: samples of the faces, and their shape round them."""
 
 from __future__ import annotations
 
@@ -257,7 +257,7 @@ def _best_steps(feet: Feet, reach: Floats) -> tuple[Floats, Floats]:
 
 
 def distinct(centres: Floats, radii: Floats, apart: float, period: float | None) -> Integers:
-    """Of spheres with nearly one centre, the largest."""
+    """Keep the largest of spheres with nearly one centre."""
     order = np.argsort(-radii, kind="stable")
     tree = tree_of(centres[order], period)
     kept = np.ones(len(order), dtype=bool)

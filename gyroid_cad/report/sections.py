@@ -67,7 +67,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is told of a lattice or a file.
+    """Report on a lattice or a file, by sections.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ def _facets(lattice: Lattice) -> Facets:
 
 
 def parameters_section(subject: Subject) -> Values:
-    """What was asked for."""
+    """Section on the parameters."""
     lattice = subject.lattice
     fields = {name: getattr(lattice, name) for name in ("thickness", "density", "scale_field", "map")}
     return {
@@ -245,7 +245,7 @@ def measures_section(subject: Subject) -> Values:
 
 
 def _trimmed_measures(lattice: Lattice) -> Values:
-    """What the kernel says of the solid that is cut to the block."""
+    """Measures of the solid that is cut to the block, by the kernel."""
     from gyroid_cad.kernel.reading import described
 
     built = lattice.built()
@@ -270,7 +270,7 @@ def _trimmed_measures(lattice: Lattice) -> Values:
 
 
 def fit_section(subject: Subject) -> Values:
-    """How far the fitted lattice is from the exact one."""
+    """Section on the fitted lattice against the exact one."""
     lattice = subject.lattice
     fitted = lattice.fitted()
     if fitted.refit is not None:
@@ -294,13 +294,13 @@ def fit_section(subject: Subject) -> Values:
 
 
 def wall_section(subject: Subject) -> Values:
-    """How thick the fitted wall is."""
+    """Section on the fitted wall's thickness."""
     found = wall_thickness(subject.lattice.fitted())
     return {"thickness": found.thickness.as_dict(), "error": found.error.as_dict()}
 
 
 def pores_section(subject: Subject) -> Values:
-    """How large the pores are."""
+    """Section on the sizes of pores."""
     found = pores_of(subject.lattice.fitted())
     return {
         "beyond": found.beyond,
@@ -319,7 +319,7 @@ def _spheres(found: ChannelSpheres | None) -> Values:
 
 
 def quality_section(subject: Subject) -> Values:
-    """What hexahedra of this lattice would be worth."""
+    """Section on the quality of this lattice's hexahedra."""
     lattice = subject.lattice
     if lattice.trim:
         return {NONE: "meshes are made of whole patches: without trim"}
@@ -339,14 +339,14 @@ def quality_section(subject: Subject) -> Values:
 
 
 def print_check_section(subject: Subject) -> Values:
-    """Whether a printer could make it."""
+    """Section on the print check of a lattice."""
     if subject.lattice.trim:
         return {NONE: "a trimmed lattice is checked as the STL file that it is written to"}
     return _checked(print_check(subject.lattice, subject.printer))
 
 
 def file_print_check_section(contents: FileContents) -> Values:
-    """Whether a printer could make what is in a file of triangles."""
+    """Section on the print check of a file of triangles."""
     if contents.triangles is None:
         return {NONE: "only triangles are checked: write the part as STL or 3MF"}
     try:

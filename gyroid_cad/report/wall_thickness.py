@@ -1,4 +1,4 @@
-"""How thick the fitted wall is: measured along the exact normal, from one fitted face to the other, by area."""
+"""Thickness of the fitted wall: measured along the exact normal, from one fitted face to the other, by area."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def distribution_of(values: ArrayLike, weights: ArrayLike | None = None, bins: i
 
 
 def _range(low: float, high: float) -> tuple[float, float]:
-    """Of a histogram: one of values that are all alike has some width too."""
+    """Range of a histogram: one of equal values has some width too."""
     # Bins must be told apart in double precision.
     least = 1e-12 * max(abs(low), abs(high), 1.0)
     return (low, high) if high - low > least else (low - least, high + least)

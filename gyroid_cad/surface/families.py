@@ -33,7 +33,7 @@ _SOUNDNESS_MARGIN = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class TubeLaw:
-    """What thickness and density of a surface's wall have to do with each other.
+    """Tube law of a surface: the relation between its wall's thickness and density.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class TubeLaw:
         return self.area + 2 * pi * self.euler_characteristic * (thickness / 2) ** 2
 
     def network_offset(self, density: float) -> float:
-        """How far from the surface a network begins that takes up a given part of space.
+        """Distance from the surface at which a network begins that takes up a given part of space.
 
         One network is half of space less half of a wall: 1/2 - A s - (2 pi chi / 3) s^3 at the distance s.
 
@@ -171,7 +171,7 @@ class MinimalSurface:
 
     @property
     def tube(self) -> TubeLaw:
-        """How thickness and density go together."""
+        """Relation between thickness and density."""
         return tube_law(self.family, len(self.cell))
 
 

@@ -48,7 +48,7 @@ _ORDER, _SURPLUS = 4, 1.05
 
 @dataclass(frozen=True, slots=True)
 class FitSettings:
-    """How the patch is fitted.
+    """Settings of the patch's fit.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class FitSettings:
 
     @property
     def plain(self) -> bool:
-        """Whether the knots are evenly spaced and the weights equal, so that the number can change."""
+        """True where knots are evenly spaced and weights equal, so that the number can change."""
         return self.knots is None and self.weights is None and self.parameterisation == "smooth"
 
     def knot_vector(self) -> Floats:
@@ -110,7 +110,7 @@ class FitSettings:
 
 
 def more_control_points(control_points: int, excess: float) -> int:
-    """How many to try next, where the error of a fit is ``excess`` times what it may be."""
+    """Number of control points to try next, where the error of a fit is ``excess`` times what it may be."""
     wanted = DEGREE + (control_points - DEGREE) * (_SURPLUS * excess) ** (1 / _ORDER)
     return int(min(max(control_points + 1, ceil(wanted)), MOST_CONTROL_POINTS))
 
@@ -214,7 +214,7 @@ def edge_gap(fitted: FittedPatch) -> float:
 
 @lru_cache(maxsize=32)
 def max_offset(fitted: FittedPatch) -> float:
-    """How far the fit can be offset to both sides before it folds over, in bounding-cell lengths.
+    """Largest offset of the fit to both sides before it folds over, in bounding-cell lengths.
 
     The exact surface folds at its smallest radius of curvature; the fit a little before. Where it is
     offset by s, its area vector along the normal is a + b s + c s^2; the smallest root over a dense grid counts.
@@ -296,7 +296,7 @@ def _fit_staged(settings: FitSettings, family: Family) -> Floats:
 
 
 def _missing_normals(rational: Floats, quadrature: Floats, area: Floats, normals: Floats) -> Floats:
-    """What the inner control points of the normals lack to carry the surface's whole area.
+    """Correction to the normals' inner control points that makes them carry the surface's whole area.
 
     Least squares leave the sum of N . dA short by 7.5e-7 of the area at 10 x 10, and every wall's volume with
     it. The missing part is spread along the area vectors; edges, which neighbours share, keep theirs.

@@ -1,4 +1,4 @@
-"""How close a fit is to the exact surface, and how many control points a tolerance takes."""
+"""Deviation of a fit from the exact surface, and the control points that a tolerance takes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _FOOT_POINT_STEPS = 4
 
 @dataclass(frozen=True, slots=True)
 class FitReport:
-    """What a fit is worth; lengths in units of the cell size L, angles in degrees, curvature in 1/L."""
+    """Errors of a fit; lengths in units of the cell size L, angles in degrees, curvature in 1/L."""
 
     max_distance: float
     rms_distance: float
@@ -80,7 +80,7 @@ def fit_report(fitted: FittedPatch) -> FitReport:
 
 
 def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID) -> FitSettings:
-    """The same settings, with as many more control points as a tolerance takes.
+    """Raise the control points of settings until a tolerance is met.
 
     Parameters
     ----------

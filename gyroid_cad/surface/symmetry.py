@@ -1,4 +1,4 @@
-"""From the semi-fundamental patch (SFP) to the cubic cell, in integers.
+"""Symmetry: the semi-fundamental patch (SFP), its bounding cell and cubic cell, in integers.
 
 Every corner of every patch lies on the grid of quarters of the bounding-cell length, so placements are
 signed permutations and translations in quarters: nothing here is rounded, and equality is exact.
@@ -34,7 +34,7 @@ __all__ = [
 Integers = NDArray[np.int64]
 # p -> M p + m, in quarters.
 Isometry = tuple[Integers, Integers]
-Corners = tuple[tuple[int, int, int], ...]
+QuarterCorners = tuple[tuple[int, int, int], ...]
 
 QUARTER = 0.25
 CELL_QUARTERS = 8
@@ -45,7 +45,7 @@ _NORMAL = np.array([1, 0, 1])
 
 
 class Neighbour(Enum):
-    """How a patch's neighbour across an edge follows: the isometry, and whether it exchanges the surface's sides."""
+    """Rule by which a patch's neighbour across an edge follows: the isometry, and the side it leads to."""
 
     HALF_TURN_ABOUT_NORMAL = "half-turn about the surface's normal at the edge's midpoint"
     HALF_TURN_ABOUT_EDGE = "half-turn about the edge, a straight line"
@@ -67,7 +67,7 @@ class Patch:
     """
 
     family: Family
-    corners: Corners
+    corners: QuarterCorners
     neighbour: Neighbour
     mirror: tuple[int, int, int] | None = None
 
@@ -201,7 +201,7 @@ def orbit(patch: Patch, first: tuple[int, int, int]) -> Placements:
 
 
 def _place(patch: Patch, matrix: Integers, translation: Integers) -> Hashable:
-    """What tells places apart that differ by more than whole cells and symmetries of the patch."""
+    """Key that tells places apart that differ by more than whole cells and symmetries of the patch."""
     corners = patch.corner_array @ matrix.T
     return tuple((translation % CELL_QUARTERS).tolist()), frozenset(map(tuple, corners.tolist()))
 

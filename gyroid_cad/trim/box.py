@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.caps import Cap, CapArc, caps_of
-from gyroid_cad.trim.edge_crossings import PLANES, Faces
+from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 from gyroid_cad.trim.sections import Sections
 from gyroid_cad.trim.trimmed_faces import CORNER, RIM, Arc, CutFace, Node, cut_faces
-from gyroid_cad.wall.complex import connected
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["Box", "BoxEdge", "BoxFace", "TrimmedWall", "cut_to_box"]
@@ -54,7 +54,7 @@ class Box:
 
     @property
     def levels(self) -> Floats:
-        """Of each of :data:`~gyroid_cad.trim.edge_crossings.PLANES`, along its axis; shape (6,)."""
+        """Levels of :data:`~gyroid_cad.trim.edge_crossings.PLANES`, each along its axis; shape (6,)."""
         return np.array([(self.low if sign > 0 else self.high)[axis] for axis, sign in PLANES])
 
 
@@ -113,7 +113,7 @@ class BoxFace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrimmedWall:
-    """What is left of a wall, or of a network beside it, in a box.
+    """A wall, or a network beside it, trimmed to a box.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class _Assembly:
         patches = np.flatnonzero(~outside & near)
         template, nets, distinct = _alike(self.wall.patch_net[patches], levels[patches], _SAME_LEVEL * self.cell_size)
         self.distinct += len(nets)
-        cut = cut_faces(Faces(self.nets[nets, side], self.wall.weights, self.wall.knots, distinct), self.cell_size)
+        cut = cut_faces(FacesToCut(self.nets[nets, side], self.wall.weights, self.wall.knots, distinct), self.cell_size)
         for patch, index in zip(patches.tolist(), template.tolist(), strict=True):
             self._add_cut(patch, side, cut[index], backwards)
 
@@ -254,7 +254,7 @@ class _Assembly:
             raise KernelError("what the box leaves of the lattice does not close: its area vectors do not add up to 0")
 
     def _positions(self, side: int) -> tuple[Booleans, Floats]:
-        """Which patches' faces lie outside; and, from each patch's own place, levels of the planes that are near."""
+        """Patches whose faces lie outside; and, from each patch's own place, levels of the planes that are near."""
         low, high = (
             reach(self.nets[:, side], axis=(1, 2))[self.wall.patch_net] + self.shifts for reach in (np.min, np.max)
         )
@@ -367,7 +367,7 @@ class _Assembly:
 
 
 def _alike(nets: Integers, levels: Floats, grain: float) -> tuple[Integers, Integers, Floats]:
-    """Which faces are cut alike: the kind of each; and the net and the levels of each kind."""
+    """Group faces that are cut alike: the kind of each; and the net and the levels of each kind."""
     if not len(nets):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, len(PLANES)))
     grains = np.where(np.isnan(levels), np.iinfo(np.int64).min / 2, np.rint(levels / grain))

@@ -78,7 +78,7 @@ def signed_area(outline: Floats) -> float:
 
 
 def contains(outline: Floats, place: Floats) -> bool:
-    """Whether a place, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
+    """Tell whether a point, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
     x, y = (outline - place).T
     next_x, next_y = np.roll(x, -1), np.roll(y, -1)
     crosses = (y > 0) != (next_y > 0)

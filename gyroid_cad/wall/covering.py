@@ -13,10 +13,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
-from gyroid_cad.wall.complex import CellComplex, build_complex, connected
+from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.exact import offset_patches, patch_points, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 
@@ -54,7 +55,7 @@ _OFFSET_SAMPLES = 17
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """Where the lattice stands: p -> rotation p + origin, from its own space to that of the part.
+    """Frame of a lattice: p -> rotation p + origin, from its own space to that of the part.
 
     Attributes
     ----------
@@ -134,7 +135,7 @@ def covering_complex(
 
 
 def _patch_radius(placements: Placements) -> float:
-    """From the middle of a patch to its corners, which are furthest from it, in cell sizes."""
+    """Radius of a patch, from its middle to its corners, which are furthest from it, in cell sizes."""
     return float(np.linalg.norm(placements.patch.corner_array, axis=1).max()) / CELL_QUARTERS
 
 
@@ -156,7 +157,7 @@ def patch_sides(
     distance: Callable[[Floats], Floats],
     contains: Callable[[Floats], Booleans],
 ) -> Integers:
-    """Which patches lie inside a part, outside it, or may be crossed by its boundary; shape (patches,).
+    """Sort patches by whether they lie inside a part, outside it, or may be crossed by its boundary; shape (patches,).
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def sides_of_points(
     distance: Callable[[Floats], Floats],
     contains: Callable[[Floats], Booleans],
 ) -> Integers:
-    """The same, of patches wherever they lie; shape (patches,).
+    """Sort patches, wherever they lie, as :func:`patch_sides` does; shape (patches,).
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ def sides_of_points(
 
 
 def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: MinimalSurface = USUAL) -> Floats:
-    """How far points of the part's space lie from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
+    """Distance of the part's points from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
 
     Parameters
     ----------
@@ -235,7 +236,7 @@ def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: Mi
 
 
 def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
-    """How far points lie from samples of a surface, along its normal.
+    """Distance of points from samples of a surface, along its normal.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def patch_points(complex: CellComplex, cell_size: float, samples: Floats) -> Flo
 
 
 def patch_points_and_normals(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
-    """The same, and the unit normals on the common side, of the same shape."""
+    """Points of patches, and the unit normals on the common side, of the same shape."""
     points, normals = _placed_grid(complex, cell_size, samples)
     corners = (complex.patch_cell * cell_size)[:, np.newaxis]
     return points[complex.patch_placement] + corners, normals[complex.patch_placement]
@@ -81,7 +81,7 @@ def patch_points_and_normals(complex: CellComplex, cell_size: float, samples: Fl
 def sampled_point(
     complex: CellComplex, cell_size: float, samples: Floats, patch: int, index: int
 ) -> tuple[float, float, float]:
-    """Where, in mm and before any map, the sample of a patch is that has a flat index in its grid."""
+    """Place, in mm and before any map, of a patch's sample that has a flat index in its grid."""
     points, _ = _placed_grid(complex, cell_size, samples)
     x, y, z = points[complex.patch_placement[patch], index] + complex.patch_cell[patch] * cell_size
     return float(x), float(y), float(z)
@@ -105,7 +105,7 @@ def _exact_grid(samples: tuple[float, ...], family: Family) -> tuple[Floats, Flo
 
 @dataclass(frozen=True, slots=True)
 class ExactMeasures:
-    """Of the exact wall.
+    """Measures of the exact wall.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From the description of a lattice to its wall, stage by stage, timed: all that comes before a solid or a mesh."""
+"""A lattice's wall, fitted from its description, stage by stage, timed: all that comes before a solid or a mesh."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ _SHIFTS = float(np.abs(PERTURBATIONS).max())
 
 @dataclass(frozen=True, slots=True)
 class LatticeSpec:
-    """What to build.
+    """Description of a lattice to be built.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ _fitted: Cache[LatticeSpec, FittedWall] = Cache()
 
 
 def fitted_wall(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
-    """The same; the last few are remembered."""
+    """Fit and check the wall of a lattice, as :func:`fit_spec` does; the last few are cached."""
     # What becomes of pieces is for the solid to know: the wall is the same.
     alike = replace(spec, keep_islands=False)
     return replace(_fitted.get(alike, lambda: fit_spec(alike, progress)), spec=spec)

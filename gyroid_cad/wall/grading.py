@@ -1,4 +1,4 @@
-"""What varies over a lattice: wall, cell size, and the space it is carried to.
+"""Grading of a lattice: its wall, cell size, and the space it is carried to.
 
 All fields are functions of the place in the lattice's own flat space, in mm, before any map. First the scale field
 s carries a point p to s(p) p, the paper's variable bounding-cell length; then the map of space carries on.
@@ -49,7 +49,7 @@ class WallPoints:
 
 @dataclass(frozen=True, slots=True)
 class Grading:
-    """How the wall and the space vary.
+    """Grading of the wall and the space.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Grading:
 
     @property
     def uniform(self) -> bool:
-        """Whether every cell is like every other: a constant wall in flat space."""
+        """True where every cell is like every other: a constant wall in flat space."""
         return not isinstance(self.thickness, Field | None) and self.scale_field is None and self.map is None
 
     @property

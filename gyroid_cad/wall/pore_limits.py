@@ -1,4 +1,4 @@
-"""How large a sphere passes through a lattice's channels, from the exact surface by distance.
+"""Pore limiting diameters: the largest spheres that pass through a lattice's channels.
 
 A network's throats are where the largest sphere that can travel through it without end is held: the places with the
 greatest least distance from the mid-surface along a path (the pore-limiting diameter of porous media). A wall's face
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.graph import runs_on
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.patch import smooth
@@ -43,6 +44,8 @@ _CLOSER_SAMPLES, _CLOSEST, _NO_NEARER = 17, 1e-8, 1e-14
 # Distances to samples that may yet turn out the least, as a part of the least; and how many are looked at closely.
 _MAY_BE_LEAST, _LOOKED_AT = 1.05, 64
 _PATCHES_AT_ONCE = 4_000
+# Of the 26 steps to the next nodes, across diagonals too, one of each two that are opposite.
+_ONWARD = np.array([step for step in np.ndindex(3, 3, 3) if step > (1, 1, 1)]) - 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +84,7 @@ def pore_limiting_diameter(surface: MinimalSurface, cell_size: float, thickness:
 
 @lru_cache(maxsize=8)
 def network_throats(surface: MinimalSurface) -> PoreLimits:
-    """Where a surface's networks are narrowest for what travels through them.
+    """Throats of a surface's networks, where they are narrowest for what travels through them.
 
     A grid is flooded from the places furthest from the surface until the flood runs through the cell without end; the
     node that joins it is the throat, and its distance is then worked out to rounding from the exact surface.
@@ -210,36 +213,15 @@ def _held(distance: Floats) -> float:
 
 
 def _endless(filled: Booleans) -> bool:
-    """Whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images elsewhere."""
-    from scipy import ndimage
-
-    labels = ndimage.label(filled, np.ones((3, 3, 3)))[0]
-    links: dict[int, set[tuple[int, int, int, int]]] = {}
-    wrapped = np.pad(labels, 1, mode="wrap")
-    for step in np.ndindex(3, 3, 3):
-        window = tuple(slice(offset, offset + size) for offset, size in zip(step, labels.shape, strict=True))
-        beyond = _cells_beyond(labels.shape, step)
-        crossing = (labels > 0) & (wrapped[window] > 0) & np.any(beyond != 0, axis=-1)
-        pairs = np.column_stack([labels[crossing], wrapped[window][crossing], beyond[crossing]])
-        for one, other, x, y, z in np.unique(pairs, axis=0).tolist():
-            links.setdefault(one, set()).add((other, x, y, z))
-    where: dict[int, tuple[int, int, int]] = {}
-    for first in links:
-        waiting = [] if first in where else [first]
-        where.setdefault(first, (0, 0, 0))
-        while waiting:
-            here = waiting.pop()
-            for other, *step_to in links[here]:
-                x, y, z = (a + b for a, b in zip(where[here], step_to, strict=True))
-                if other not in where:
-                    where[other] = x, y, z
-                    waiting.append(other)
-                elif where[other] != (x, y, z):
-                    return True
-    return False
-
-
-def _cells_beyond(shape: tuple[int, ...], step: tuple[int, ...]) -> Integers:
-    """In which cell, from -1 to 1 along each axis, the node lies that a step (0 to 2, less 1) leads to."""
-    axes = [np.floor_divide(np.arange(size) + offset - 1, size) for size, offset in zip(shape, step, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    """Tell whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images."""
+    number = np.flatnonzero(filled)
+    at = np.stack(np.unravel_index(number, filled.shape), axis=1)
+    first, second, cells = [], [], []
+    for step in _ONWARD:
+        cell, other = np.divmod(at + step, filled.shape)
+        there = np.ravel_multi_index(tuple(other.T), filled.shape)
+        joined = filled.ravel()[there]
+        first.append(number[joined])
+        second.append(there[joined])
+        cells.append(cell[joined])
+    return runs_on(filled.size, np.concatenate(first), np.concatenate(second), np.concatenate(cells))

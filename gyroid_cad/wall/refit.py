@@ -39,7 +39,7 @@ _EDGE_GAP_LIMIT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Refit:
-    """What the fit of a graded wall is worth.
+    """Errors of the fit of a graded wall.
 
     Attributes
     ----------
@@ -66,11 +66,11 @@ class Refit:
     samples: int
 
     def excess(self, tolerance: float, cell_size: float) -> float:
-        """How many times as far off the fit is as it may be."""
+        """Error of the fit in units of what it may be."""
         return max(self.max_deviation / (tolerance * cell_size), self.max_wall_error / (WALL_PER_TOLERANCE * tolerance))
 
     def control_points_for(self, tolerance: float, cell_size: float) -> int:
-        """How many control points to fit with next; as many as now if the fit is as close as asked for.
+        """Number of control points to fit with next; as many as now if the fit is close enough.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Refit:
 
 
 def likely_control_points(complex: CellComplex, grading: Grading, least: int, tolerance: float) -> int:
-    """How many control points the tolerance is likely to take, from a fit of a few patches.
+    """Number of control points that the tolerance is likely to take, from a fit of a few patches.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether a graded wall can exist: inside its own curvature, and clear of the walls opposite.
+"""Self-intersection of graded walls: local, beyond their own curvature, and global, with the walls opposite.
 
 The kernel's check says "valid" to a wall that meets itself, so this is decided here, on the exact wall, before
 anything is fitted. That the map turns nothing inside out is seen to by :mod:`gyroid_cad.wall.grading`, wherever it
@@ -49,7 +49,7 @@ _PATCHES_AT_ONCE = 64
 
 @dataclass(frozen=True, slots=True)
 class _Worst:
-    """Where the wall would have to be scaled most to pass, and by what."""
+    """Place where the wall would have to be scaled most to pass, and the factor."""
 
     factor: float
     patch: int
@@ -164,7 +164,7 @@ def _fitted_fold_factor(wall: Wall, some: slice, samples: Floats) -> Floats:
 
 
 def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats) -> list[_Worst]:
-    """Where walls meet others most, if they do."""
+    """Places where walls meet others most, if they do."""
     from scipy.spatial import cKDTree
 
     patch = np.repeat(np.arange(complex.patch_count), CLEARANCE_SAMPLES**2)
@@ -214,7 +214,7 @@ class _Lookup:
     steps: Floats
 
     def met(self, samples: Integers, offsets: Floats) -> tuple[tuple[Integers, Floats], Integers]:
-        """Which samples, moved by the offsets, lie in other walls, and what factor on both walls would part them.
+        """Samples that, moved by the offsets, lie in other walls, and the factor on both walls that would part them.
 
         Also those that only come nearer to another mid-surface than to their own: they may have passed its wall.
         """
@@ -233,7 +233,7 @@ class _Lookup:
         return (first[inside], factor), first[other & ~inside]
 
     def beside(self, samples: Integers) -> tuple[tuple[Integers, Floats], Integers]:
-        """Which samples lie over a mid-surface that is no neighbour, nearer than both walls reach, and the same factor.
+        """Samples over a mid-surface that is no neighbour, nearer than both walls reach, and the same factor.
 
         Walls thinner than the places looked at lie apart would else pass unseen. Also those that the other mid-surface
         parts from one of the places next to them: whatever the walls, these cross.
@@ -255,7 +255,7 @@ class _Lookup:
         return (first[factor < 1], factor[factor < 1]), first[parted]
 
     def _over(self, first: Integers, second: Integers) -> tuple[Booleans, Floats]:
-        """Whether the first samples stand over the cells round the second ones, and how high."""
+        """Mask of the first samples that stand over the cells round the second ones, and their heights."""
         apart = self.middle[first] - self.middle[second]
         steps = self.steps[second]
         # In steps of the grid, by least squares in the tangent plane.
@@ -269,7 +269,7 @@ class _Lookup:
         return np.all((low <= along) & (along <= high), axis=1), height
 
     def _neighbours(self, first: Integers, second: Integers) -> Booleans:
-        """Whether the patches of two samples share a corner."""
+        """Mask of the sample pairs whose patches share a corner."""
         corners = (self.corners[self.patch[samples]] for samples in (first, second))
         one, other = corners
         return np.asarray((one[:, :, np.newaxis] == other[:, np.newaxis, :]).any(axis=(1, 2)))

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import measure, require_part
 from gyroid_cad.kernel.split import compound_of
 
@@ -106,9 +107,8 @@ def test_no_place_on_the_boundary_is_further_from_the_samples_than_is_said(spaci
 def test_sampling_leaves_no_triangles_on_the_users_part() -> None:
     from OCP.BRep import BRep_Tool
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
     shape = ball()
     require_part(shape).surface_samples(0.5)
     for face in parts_of(shape, TopAbs_FACE):
-        assert BRep_Tool.Triangulation_s(TopoDS.Face_s(face), TopLoc_Location()) is None
+        assert BRep_Tool.Triangulation_s(as_face(face), TopLoc_Location()) is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cadquery as cq
+import build123d as bd
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -18,11 +18,11 @@ from gyroid_cad.surface.fit import FitSettings
 
 @pytest.mark.parametrize("ending", [".step", ".stp", ".brep"])
 def test_a_box_is_read_back_with_its_faces_and_size(tmp_path: Path, ending: str) -> None:
-    box, path = cq.Workplane().box(1, 2, 3).val().wrapped, tmp_path / f"box{ending}"
+    box, path = bd.Box(1, 2, 3), tmp_path / f"box{ending}"
     if ending == ".brep":
-        write_brep(box, path)
+        write_brep(box.wrapped, path)
     else:
-        cq.exporters.export(cq.Workplane(cq.Shape.cast(box)), str(path), exportType="STEP")
+        bd.export_step(box, path)
     found = described(read_shape(path))
     assert (found.topology.solids, found.topology.faces, found.topology.closed, found.valid) == (1, 6, True, True)
     assert (found.volume, found.area) == (pytest.approx(6), pytest.approx(22))
@@ -31,14 +31,14 @@ def test_a_box_is_read_back_with_its_faces_and_size(tmp_path: Path, ending: str)
 
 
 def test_a_box_without_its_lid_is_described_as_open() -> None:
-    faces = cq.Workplane().box(1, 2, 3).faces("not >Z").vals()
-    found = described(cq.Shell.makeShell(faces).wrapped)
+    faces = bd.Box(1, 2, 3).faces().sort_by(bd.Axis.Z)[:-1]
+    found = described(bd.Shell(faces).wrapped)
     assert (found.topology.solids, found.topology.faces, found.topology.open_edges) == (0, 5, 4)
     assert not found.topology.closed
 
 
 def test_triangles_to_look_at_are_as_large_as_the_shape() -> None:
-    vertices, triangles, faces = shown_triangles(cq.Workplane().sphere(5).val().wrapped)
+    vertices, triangles, faces = shown_triangles(bd.Sphere(5).wrapped)
     assert areas(vertices, triangles).sum() == pytest.approx(4 * np.pi * 25, rel=0.01)
     assert not faces.any()
 
@@ -51,10 +51,10 @@ def areas(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArra
 
 
 def test_triangles_are_told_by_the_faces_they_lie_on() -> None:
-    box = cq.Workplane().box(1, 2, 3).edges("|Z").fillet(0.2).val()
+    box = bd.fillet(bd.Box(1, 2, 3).edges().filter_by(bd.Axis.Z), 0.2)
     vertices, triangles, faces = shown_triangles(box.wrapped)
     by_face = np.bincount(faces, areas(vertices, triangles))
-    assert by_face == pytest.approx([face.Area() for face in box.Faces()], rel=2e-3)
+    assert by_face == pytest.approx([face.area for face in box.faces()], rel=2e-3)
 
 
 def test_faces_of_a_lattice_are_told_by_their_sides_also_in_a_file_and_those_of_other_things_by_none(
@@ -70,8 +70,9 @@ def test_faces_of_a_lattice_are_told_by_their_sides_also_in_a_file_and_those_of_
         # Both faces of a thin wall are about as large; where it is cut there is its thickness.
         assert of_sides[0] == pytest.approx(of_sides[1], rel=0.1)
         assert 0.1 < of_sides[2] / of_sides[0] < 0.5
-    spline = cq.Workplane().spline([(0, 0), (1, 1), (2, 0)]).close().extrude(1)
-    assert set(lattice_sides(spline.val().wrapped)) == {None}
+    spline = bd.Spline((0, 0), (1, 1), (2, 0))
+    extruded = bd.extrude(bd.make_face(bd.Curve([spline, bd.Line((2, 0), (0, 0))])), 1)
+    assert set(lattice_sides(extruded.wrapped)) == {None}
 
 
 @pytest.mark.parametrize("name", ["a.step", "a.brep"])

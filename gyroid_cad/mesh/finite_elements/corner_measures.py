@@ -1,4 +1,4 @@
-"""What an element's corners say of its shape, as Verdict defines it: scaled Jacobian, ratios, skew, warpage, angles.
+"""Shape measures of an element from its corners, as Verdict defines them: scaled Jacobian, ratios, skew, angles.
 
 Verdict is the library behind VTK's and CUBIT's quality filters (Knupp et al., The Verdict Geometric Quality Library,
 SAND2007-1751; VTK's copy in ThirdParty/verdict). It differs here in four things, each held by a test:
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import cross
 
-__all__ = ["HEXAHEDRON_FACES", "NO_NUMBER", "hexahedron_corner_measures", "quadrilateral_corner_measures"]
+__all__ = ["HEXAHEDRON_FACES", "NO_NUMBER", "Measures", "hexahedron_corner_measures", "quadrilateral_corner_measures"]
 
 Floats = NDArray[np.float64]
 Measures = dict[str, Floats]

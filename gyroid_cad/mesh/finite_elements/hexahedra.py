@@ -87,12 +87,12 @@ class Mesh:
 
     @property
     def element_patch(self) -> Integers:
-        """Which patch each element belongs to; shape (elements,)."""
+        """Patch of each element; shape (elements,)."""
         return np.arange(len(self.cells)) // (max(self.layers, 1) * self.subdivisions**2)
 
     @property
     def element_layer(self) -> Integers:
-        """Which layer each element belongs to, from face B on; shape (elements,)."""
+        """Layer of each element, from face B on; shape (elements,)."""
         return np.arange(len(self.cells)) // self.subdivisions**2 % max(self.layers, 1)
 
     @property
@@ -255,7 +255,7 @@ def _split_grids(wall: Wall, nets: Integers | slice, steps: int, levels: Floats)
 
 
 def _on_border(steps: int) -> NDArray[np.bool_]:
-    """Which places of a patch's grid, in one row, lie on its border."""
+    """Mask of the places of a patch's grid, in one row, that lie on its border."""
     border = np.ones((steps + 1, steps + 1), dtype=bool)
     border[1:-1, 1:-1] = False
     return border.ravel()

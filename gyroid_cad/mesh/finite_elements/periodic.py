@@ -117,7 +117,7 @@ def _paired_nodes(complex: CellComplex, inner: int) -> tuple[Integers, Integers,
 
 
 def _alike(keys: Integers) -> tuple[Integers, Integers]:
-    """Of rows that are equal, the first one, over and over, and each of the others."""
+    """Pairs of equal rows: the first one, over and over, and each of the others."""
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     leader = first[group.ravel()]
     others = np.flatnonzero(leader != np.arange(len(keys)))

@@ -1,4 +1,4 @@
-"""How good the elements of a mesh are: measures of each, summaries of all, and which are turned inside out.
+"""Quality of a mesh's elements: measures of each, summaries of all, and those turned inside out.
 
 The measures are Verdict's, of the corner nodes (``corner_measures.py``); hexahedra are looked at by their own shape
 functions too (``determinants.py``), for the corners of a quadratic one say little of its middle nodes.
@@ -19,7 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.corner_measures import hexahedron_corner_measures, quadrilateral_corner_measures
+from gyroid_cad.mesh.finite_elements.corner_measures import (
+    Measures,
+    hexahedron_corner_measures,
+    quadrilateral_corner_measures,
+)
 from gyroid_cad.mesh.finite_elements.elements import element_type
 from gyroid_cad.mesh.finite_elements.summaries import (
     USUAL_BOUNDS,
@@ -64,7 +68,7 @@ _NOTHING = 1e-14
 
 
 def hexahedron_nodes(count: int) -> Floats:
-    """Where the nodes of a hexahedron of 8, 20 or 27 nodes lie on [-1, 1]^3, in VTK's order; shape (count, 3)."""
+    """Nodes of a hexahedron of 8, 20 or 27 nodes on [-1, 1]^3, in VTK's order; shape (count, 3)."""
     return _NODES[:count].copy()
 
 
@@ -120,7 +124,7 @@ def sampled_determinants(nodes: Floats) -> Floats:
 
 
 def determinant_measures(nodes: Floats) -> dict[str, Floats]:
-    """What the determinants at a hexahedron's nodes and Gauss points say of it.
+    """Measures of a hexahedron by its Jacobian determinants at nodes and Gauss points.
 
     - determinant_ratio: the least over the largest magnitude: 1 for a parallelepiped, none or less where it is inverted
     - sampled_scaled_jacobian, of quadratic hexahedra: the least determinant of the three unit vectors along the
@@ -170,7 +174,7 @@ def _sampled_gradients(count: int) -> Floats:
 
 
 def _exponents(count: int) -> NDArray[np.int64]:
-    """Of the monomials whose combinations the shape functions are; shape (count, 3)."""
+    """Exponents of the monomials whose combinations the shape functions are; shape (count, 3)."""
     highest = 1 if count == 8 else 2
     powers = np.array(list(product(range(highest + 1), repeat=3)))
     superlinear = np.where(powers > 1, powers, 0).sum(axis=1)
@@ -183,7 +187,6 @@ def _monomials(exponents: NDArray[np.int64], places: Floats) -> Floats:
 
 
 Integers = NDArray[np.int64]
-Measures = dict[str, Floats]
 
 _QUADRILATERAL = 4
 _CORNERS = 8

@@ -1,4 +1,4 @@
-"""What all elements' measures amount to: extremes, means, histograms, and where the worst is. Summaries add up."""
+"""Summaries of all elements' measures: extremes, means, histograms, and the place of the worst. They add up."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import PNG, require_output
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.corner_measures import NO_NUMBER
 
@@ -41,7 +42,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """Of a measure: which end is good, where acceptable ends, and the bins it is counted in."""
+    """Properties of a measure: its good end, its acceptable range, and the bins it is counted in."""
 
     larger_is_better: bool
     bound: float
@@ -119,7 +120,7 @@ class MeasureSummary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quality:
-    """How good the elements of a mesh are.
+    """Quality of the elements of a mesh.
 
     Attributes
     ----------
@@ -265,7 +266,6 @@ def _both_summaries(
     )
 
 
-_FORMAT = ".png"
 _COLUMNS = 4
 # In inches, of each histogram; and how fine.
 _WIDTH, _HEIGHT, _DOTS_PER_INCH = 3.1, 2.3, 110
@@ -280,9 +280,7 @@ def require_histogram(path: str | os.PathLike[str]) -> Path:
     ParameterError
         If the path does not end in .png or cannot be written to, or matplotlib is missing.
     """
-    target = require_writable(path)
-    if target.suffix.lower() != _FORMAT:
-        raise ParameterError("histogram", str(path), f"a file name ending in {_FORMAT}")
+    target = require_output(path, [PNG], "histogram")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError:

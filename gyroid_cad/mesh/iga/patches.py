@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
 from gyroid_cad.nurbs.volume import NurbsVolume
-from gyroid_cad.wall.complex import CellComplex, build_complex, connected
+from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["BOUNDARY_PARTS", "DEGREES_ACROSS", "FACE_CORNERS", "VolumePatches", "periodic_points", "wall_volumes"]
@@ -103,7 +104,7 @@ class VolumePatches:
 
     @property
     def rational(self) -> bool:
-        """Whether the weights differ, so that the patches are not polynomial."""
+        """True where the weights differ, so that the patches are not polynomial."""
         return bool(np.ptp(self.weights) > 0)
 
     def patch(self, index: int) -> NurbsVolume:

@@ -47,7 +47,7 @@ class FaceGroup:
 
     @property
     def triangles(self) -> Integers:
-        """Of both faces, oriented outwards, in the corners of face 0 and then of face 1; shape (triangles, 3)."""
+        """Triangles of both faces, oriented outwards, in the corners of face 0, then 1; shape (triangles, 3)."""
         below, above = self.template.triangles[:, ::-1], self.template.triangles + len(self.template.places)
         return np.concatenate([below, above])
 
@@ -76,7 +76,7 @@ def side_groups(triangulation: Triangulation) -> Iterator[tuple[Template, Intege
 
 
 class Corners:
-    """Where the corners of a triangulation are, in mm, in single precision: x, y, z and a zero.
+    """Coordinates of a triangulation's corners, in mm, in single precision: x, y, z and a zero.
 
     For what is gathered of them: sixteen bytes at a time go four times as quick as twelve.
 
@@ -98,7 +98,7 @@ class Corners:
         self._matrices: dict[int, Floats] = {}
 
     def of_faces(self, group: FaceGroup) -> Callable[[Integers], Singles]:
-        """From some patches of a group to the corners of both their faces, shape (patches, 2, places, 4)."""
+        """Function from some patches of a group to the corners of both their faces, shape (patches, 2, places, 4)."""
         wall, complex = self._wall, self._wall.complex
         first = sum(group.edge_steps)
         if group.steps not in self._matrices:
@@ -280,7 +280,7 @@ class _Numbers:
 
 
 def _four_wide(places: Floats) -> Singles:
-    """In single precision, with a zero behind."""
+    """Coordinates in single precision, with a zero behind."""
     wide = np.zeros((*places.shape[:-1], 4), dtype=np.float32)
     wide[..., :3] = places
     return wide

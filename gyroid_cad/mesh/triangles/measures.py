@@ -1,4 +1,4 @@
-"""Areas, volumes, pieces and wall thickness of meshes of triangles."""
+"""Areas, volumes, pieces, voids and wall thickness of meshes of triangles."""
 
 from __future__ import annotations
 
@@ -9,81 +9,148 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import GyroidError
-from gyroid_cad.wall.complex import connected
 
 __all__ = ["TriangleMeasures", "measured_walls", "triangle_measures"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
+# Solid angle of a whole sphere, by which winding numbers are counted.
+_SPHERE = 4 * np.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TriangleMeasures:
-    """What triangles amount to.
+    """Measures of a mesh of triangles, shell by shell.
+
+    A shell is what is connected by edges. Oriented outwards, one that bounds solid encloses a positive volume, and one
+    that bounds a void within it a negative one.
 
     Attributes
     ----------
     triangles, vertices : int
-    closed : bool
-        Whether every edge is used by as many triangles one way as the other: then there is an inside.
-    manifold : bool
-        Whether it is used exactly once each way.
     open_edges : int
-        Edges used more often one way than the other.
-    pieces : int
-        That are connected by vertices.
-    low, high : tuple of float
+        Used more often one way than the other: at these the surface is not closed, or turned inside out.
+    manifold : bool
+        Whether every edge is used exactly once each way.
+    low, high : ndarray, shape (3,)
         Corners of the bounding box, in mm.
-    volume, area : float
-        In mm3 and mm2; the volume is of no meaning where the triangles are not closed.
+    area : float
+        In mm2.
+    volumes : ndarray, shape (shells,)
+        Signed, in mm3; the largest in size first. Of no meaning where a shell is not closed.
+    inwards, inside : ndarray of bool, shape (shells,)
+        Which shells are closed and turned inwards, and whether another goes round these.
     """
 
     triangles: int
     vertices: int
-    closed: bool
-    manifold: bool
     open_edges: int
-    pieces: int
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    volume: float
+    manifold: bool
+    low: Floats
+    high: Floats
     area: float
+    volumes: Floats
+    inwards: Booleans
+    inside: Booleans
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def closed(self) -> bool:
+        """Tell whether every edge is used as often one way as the other: then there is an inside."""
+        return self.open_edges == 0
+
+    @property
+    def volume(self) -> float:
+        """Of all shells together, in mm3."""
+        return float(self.volumes.sum())
+
+    @property
+    def pieces(self) -> int:
+        """Bodies that no edge joins: all shells but those turned inwards."""
+        return int(np.sum(~self.inwards))
+
+    @property
+    def trapped_voids(self) -> int:
+        """Shells turned inwards, inside another."""
+        return int(np.sum(self.inwards & self.inside))
+
+    @property
+    def inside_out(self) -> int:
+        """Shells turned inwards that no other goes round."""
+        return int(np.sum(self.inwards & ~self.inside))
 
 
-def triangle_measures(vertices: Floats, triangles: Integers) -> TriangleMeasures:
-    """What triangles are: their size, whether they close, and what they enclose.
+def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> TriangleMeasures:
+    """Measure triangles: their size, whether they close, and what they enclose.
 
     Parameters
     ----------
-    vertices : ndarray, shape (n, 3)
-        In mm.
-    triangles : ndarray of int, shape (m, 3)
+    vertices : ndarray, shape (vertices, 3)
+        In mm; no two alike, for triangles are connected by their vertices' numbers.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+
+    Returns
+    -------
+    TriangleMeasures
     """
+    points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    keys = edges.min(axis=1) * len(points) + edges.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    same, owner = keys[order][1:] == keys[order][:-1], order // 3
+    labels = connected(len(facets), owner[:-1][same], owner[1:][same])
+    first = np.flatnonzero(np.concatenate([[True], ~same]))
+    one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))
+    opened = 2 * one_way != uses
     # Near the triangles, so that volumes far from the origin lose no digits.
-    middle = vertices.mean(axis=0)
-    a, b, c = (vertices[triangles[:, k]] - middle for k in range(3))
-    twice = np.cross(b - a, c - a)
-    ends = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    forward = ends[:, 0] < ends[:, 1]
-    edges, which = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    one_way = np.bincount(which.ravel()[forward], minlength=len(edges))
-    other_way = np.bincount(which.ravel()[~forward], minlength=len(edges))
-    used = np.unique(triangles)
-    label = connected(len(vertices), edges[:, 0], edges[:, 1])[used]
-    low, high = vertices[used].min(axis=0), vertices[used].max(axis=0)
+    a, b, c = np.moveaxis(points[facets] - points.mean(axis=0), 1, 0)
+    volumes = np.bincount(labels, dot(a, np.cross(b, c)) / 6).astype(np.float64)
+    closed = np.bincount(labels[owner[first[opened]]], minlength=len(volumes)) == 0
+    ranked = np.argsort(-np.abs(volumes), kind="stable")
+    inwards = (closed & (volumes < 0))[ranked]
+    # There may be thousands of loose pieces, and each question takes all triangles: only voids are asked.
+    inside = np.zeros(len(ranked), dtype=np.bool_)
+    for place in np.flatnonzero(inwards).tolist():
+        inside[place] = _inside_another(points, facets, labels, int(ranked[place]))
+    used = np.unique(facets)
     return TriangleMeasures(
-        triangles=len(triangles),
+        triangles=len(facets),
         vertices=len(used),
-        closed=bool(np.all(one_way == other_way)),
-        manifold=bool(np.all((one_way == 1) & (other_way == 1))),
-        open_edges=int(np.sum(one_way != other_way)),
-        pieces=len(np.unique(label)),
-        low=tuple(low.tolist()),
-        high=tuple(high.tolist()),
-        volume=float(np.sum(a * twice) / 6),
-        area=float(np.sum(np.linalg.norm(twice, axis=1)) / 2),
+        open_edges=int(np.sum(opened)),
+        manifold=bool(np.all((uses == 2) & (one_way == 1))),
+        low=points[used].min(axis=0),
+        high=points[used].max(axis=0),
+        area=float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)) / 2),
+        volumes=volumes[ranked],
+        inwards=inwards,
+        inside=inside,
     )
+
+
+def _inside_another(points: Floats, triangles: Integers, labels: Integers, shell: int) -> bool:
+    """Tell whether another shell goes round one: by the winding number of the others about a point of it.
+
+    Solid angles of triangles as of van Oosterom and Strackee (IEEE Trans. Biomed. Eng. 30, 1983).
+    """
+    others = labels != shell
+    point = points[triangles[np.flatnonzero(~others)[0], 0]]
+    a, b, c = np.moveaxis(points[triangles[others]] - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+    flat = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
+    angles = 2 * np.arctan2(dot(a, np.cross(b, c)), flat)
+    # Shell by shell: what one encloses another may exclude.
+    winding = np.bincount(labels[others], angles, minlength=int(labels.max()) + 1) / _SPHERE
+    return bool(np.any(np.rint(winding) != 0))
 
 
 # A ray starts so far inside, as a part of the solid's size: beyond rounding, and far below any wall.
@@ -137,7 +204,7 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
 
 
 def _locator(points: Floats, triangles: NDArray[np.int64]) -> Any:
-    """What finds the triangles that a line meets."""
+    """Locator of the triangles that a line meets."""
     core, model, support = _vtk("vtkCommonCore"), _vtk("vtkCommonDataModel"), _vtk("util.numpy_support")
     data, nodes, cells = model.vtkPolyData(), core.vtkPoints(), model.vtkCellArray()
     ends = np.arange(0, triangles.size + 1, 3)

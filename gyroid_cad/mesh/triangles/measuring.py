@@ -1,4 +1,4 @@
-"""How far triangles are from the faces they stand for, and what volume they enclose.
+"""Deviation of triangles from the faces they stand for, and the volume they enclose.
 
 Everything is linear in the control points: of each template there are matrices, and all patches that share it are
 measured by a few products.
@@ -23,7 +23,7 @@ from gyroid_cad.mesh.triangles.templates import (
 from gyroid_cad.nurbs.surface import edge_row
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["canonical_edges", "enclosed_volume", "face_cases", "face_deviations", "side_deviations"]
+__all__ = ["canonical_edges", "face_cases", "face_deviations", "side_deviations", "triangulated_volume"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,7 +35,7 @@ _ACROSS_KNOTS = np.array([0.0, 0.0, 1.0, 1.0])
 
 
 def canonical_edges(wall: Wall, edges: Integers) -> tuple[Integers, Integers]:
-    """Where edges are evaluated, once for all that share them.
+    """Patches on which edges are evaluated, once for all that share them.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def face_deviations(wall: Wall, cases: Integers) -> Floats:
 def side_deviations(
     wall: Wall, free: Integers, steps: Integers, template: Callable[[int], Template]
 ) -> tuple[Floats, Integers]:
-    """The same of distinct side walls with distinct steps along them, and which of them each boundary edge has.
+    """Deviations of distinct side walls with distinct steps along them, and the one that each boundary edge has.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def side_deviations(
     return deviations, which
 
 
-def enclosed_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers, across: int) -> float:
+def triangulated_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers, across: int) -> float:
     """Volume in mm3 that the triangles of faces and side walls enclose, by the divergence theorem."""
     shifts = wall.shifts[wall.patch_shift]
     cases, which = face_cases(wall, patch_steps, edge_steps)
@@ -188,7 +188,7 @@ def _deviations(chords: Floats, rates: Floats, controls: Floats) -> Floats:
 
 
 def _sums(template: Template, nodes: Floats, controls: Floats) -> Floats:
-    """Of surfaces, the sum over triangles of det(a, b, c) / 6, and that of the vectors of area; (surfaces, 4)."""
+    """Sums over the triangles of surfaces of det(a, b, c) / 6 and of the vectors of area; shape (surfaces, 4)."""
     points = _components(nodes, controls)
     a, b, c = (points[:, :, template.triangles[:, k]] for k in range(3))
     twice = cross(b - a, c - a)

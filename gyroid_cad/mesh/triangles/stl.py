@@ -100,7 +100,7 @@ class _Space:
         self._corners = np.empty((3, 0), dtype=_SIXTEEN_BYTES)
 
     def records(self, count: int) -> NDArray[np.void]:
-        """So many records, with what was left in them."""
+        """Buffer of so many records, with what was left in them."""
         if len(self._records) < count:
             self._records = np.zeros(count, _RECORD)
         return self._records[:count]

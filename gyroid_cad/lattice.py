@@ -18,6 +18,7 @@ from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.tables import cells_shown
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
@@ -336,7 +337,7 @@ class Lattice(LatticeParameters):
 
     def _shown(self) -> list[tuple[str, str]]:
         """Rows that a notebook shows beside the picture."""
-        rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
+        rows = [("cells", cells_shown(self.cells, self.cell_size, self.grading().cells_alike))]
         drawn = prod(self.cells) <= self._most_drawn
         # What varies over so many cells would take long to measure.
         if self.uniform or drawn:

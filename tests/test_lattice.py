@@ -25,7 +25,7 @@ from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.shells import shells_of
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 
@@ -376,7 +376,7 @@ def test_the_files_of_a_lattice_cut_to_its_block_hold_one_piece(tmp_path: Path, 
     if ending == "step":
         assert topology(read_step(path)).solids == 1
     else:
-        assert shells_of(*read_triangles(path)).pieces == 1
+        assert triangle_measures(*read_triangles(path)).pieces == 1
 
 
 def test_islands_are_of_trimmed_lattices_only() -> None:

@@ -15,6 +15,7 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import STEP, require_format
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
+from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.wall.fitted import LatticeSpec
 
@@ -120,6 +121,8 @@ class AssemblyReport:
         The cell, by the kernel's own check; every edge bounds exactly two faces.
     volume, volume_exact : float
         In mm3, of all cells: enclosed by the kernel's faces, and by the tube formula.
+    area : float
+        In mm2, of all that bounds the cells, each by itself.
     seconds : dict
         By stage.
     """
@@ -134,11 +137,26 @@ class AssemblyReport:
     closed: bool
     volume: float
     volume_exact: float
+    area: float
     seconds: dict[str, float]
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
         return asdict(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        state = f"{'valid' if self.valid else 'invalid'} and {'closed' if self.closed else 'open'}"
+        return [
+            ("cells", cells_shown(self.cells, self.cell_size)),
+            ("wall", wall_shown(self.thickness, self.thickness, self.thickness, self.density)),
+            ("instances", f"{self.instances:,} of one {state} solid of {self.faces} faces, not fused"),
+            ("volume", volume_shown(self.volume, self.volume_exact)),
+            ("area", f"{self.area:.8g} mm2"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
 
 def assembly(spec: LatticeSpec, progress: Progress | None = None) -> Assembly:
@@ -186,6 +204,7 @@ def assembly_report(made: Assembly, thickness: float, density: float, volume_exa
         closed=made.cell.topology.closed,
         volume=count * made.cell.volume,
         volume_exact=volume_exact,
+        area=count * made.cell.area(),
         seconds=dict(made.cell.seconds),
     )
 

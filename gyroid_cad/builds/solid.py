@@ -20,6 +20,7 @@ from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
+from gyroid_cad.wall.areas import fitted_areas
 from gyroid_cad.wall.covering import PERTURBATIONS, first_success
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
@@ -64,6 +65,7 @@ class Build:
         self._valid: bool | None = None
         self.shift = (0.0, 0.0, 0.0)
         self.islands = Islands()
+        self._cut_area = 0.0
         self._require_memory(_SOLID_BYTES_PER_CELL)
         with self.timed("kernel", progress):
             from gyroid_cad.kernel.check import enclosed_volume, topology
@@ -109,6 +111,7 @@ class Build:
         volumes = left.volumes.tolist()
         kept = kept_pieces(volumes, sum(volumes) / prod(self.cells), island_rule(spec.keep_islands))
         self.islands = islands_of(volumes, kept)
+        self._cut_area = float(left.areas[kept].sum())
         self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
         shape = solids[kept[0]] if len(kept) == 1 else compound_of(solids[piece] for piece in kept)
         of_faces = left.component[: len(left.faces)].tolist()
@@ -127,6 +130,10 @@ class Build:
         """Tell that a stage begins and ends, and add the seconds between."""
         with timed(self.seconds, stage, progress):
             yield
+
+    def area(self) -> float:
+        """Area in mm2 of all that bounds the solid, by quadrature of the nets and of what was cut of them."""
+        return self._cut_area if self.fitted.spec.trimmed else fitted_areas(self.fitted.wall).total
 
     def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.console import print_mesh, print_table, print_volumes, shown_progress
+from gyroid_cad.cli.console import print_report, print_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options
 from gyroid_cad.cli.options import json_option, one_of, output_option, quiet_option
 from gyroid_cad.common.files import file_sizes, require_distinct
@@ -101,7 +101,8 @@ def mesh_command(
                 write_mesh(made, target, pairs, progress)
         if measured is not None and histogram is not None:
             draw_quality(measured, histogram)
-    files = [*output, *([histogram] if histogram else [])]
+    files = file_sizes([*output, *([histogram] if histogram else [])])
+    seconds = time.perf_counter() - start
     summary = {
         "element": made.element.name,
         "elements": len(made.cells),
@@ -112,17 +113,16 @@ def mesh_command(
         "sets": {name: len(some) for name, some in {**made.node_sets(), **made.element_sets()}.items()},
         "periodic_pairs": 0 if pairs is None else len(pairs),
         "quality": None if measured is None else measured.as_dict(),
-        "files": file_sizes(files),
-        "seconds": time.perf_counter() - start,
+        "files": files,
+        "seconds": seconds,
     }
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_mesh(summary)
+        rows = made.rows() if pairs is None else [*made.rows(), ("periodic pairs", f"{len(pairs):,}")]
+        print_report(rows, files, seconds)
         if measured is not None:
-            from gyroid_cad.mesh.finite_elements.summaries import quality_rows
-
-            print_table(*quality_rows(measured))
+            print_table(measured.header(), measured.rows())
 
 
 @click.command("volumes")
@@ -161,15 +161,16 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
         for target in targets:
             with timed({}, f"write {target.name}", progress):
                 write_volumes(made, target)
+    files, seconds = file_sizes(output), time.perf_counter() - start
     summary = {
         "patches": len(made),
         "degrees": list(made.degrees),
         "control_points": len(made.control_points),
         "interfaces": len(made.interfaces),
-        "files": file_sizes(output),
-        "seconds": time.perf_counter() - start,
+        "files": files,
+        "seconds": seconds,
     }
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_volumes(summary)
+        print_report(made.rows(), files, seconds)

@@ -14,7 +14,7 @@ from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.shells import shells_of
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 
 Captured = pytest.CaptureFixture[str]
 
@@ -77,7 +77,7 @@ def test_small_islands_are_dropped_unless_they_are_to_be_kept(
     assert (done.status, done.err) == (0, "")
     summary = json.loads(done.out)
     assert (summary["solids"], summary["islands"], summary["dropped"]) == (solids, islands, dropped)
-    assert shells_of(*read_triangles(tmp_path / "a.stl")).pieces == solids
+    assert triangle_measures(*read_triangles(tmp_path / "a.stl")).pieces == solids
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, ElementType, element_type
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
@@ -84,6 +85,18 @@ class Mesh:
         for array in (self.points, self.cells, self.kept):
             if array is not None:
                 array.setflags(write=False)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        n, across = self.subdivisions, f"{self.layers} across the wall" if self.layers else "of the mid-surface"
+        return [
+            ("elements", f"{len(self.cells):,} {self.element.name}: {n} x {n} a patch, {across}"),
+            ("nodes", f"{len(self.points):,}"),
+            ("patches", f"{self.complex.patch_count:,}"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
     @property
     def element_patch(self) -> Integers:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.graph import connected
+from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
 from gyroid_cad.nurbs.volume import NurbsVolume
@@ -92,6 +93,17 @@ class VolumePatches:
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        return [
+            ("patches", f"{len(self):,} of degrees {', '.join(map(str, self.degrees))}"),
+            ("control points", f"{len(self.control_points):,}"),
+            ("interfaces", f"{len(self.interfaces):,}"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
     def __len__(self) -> int:
         return len(self.patch_points)

@@ -22,14 +22,13 @@ from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
-from gyroid_cad.filling.part import Filling, Outcome, without_islands
+from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.kernel.check import topology
-from gyroid_cad.kernel.part import Part, require_part, selected_faces
+from gyroid_cad.kernel.part import Part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.split import compound_of
-from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
@@ -40,7 +39,7 @@ from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 
-__all__ = ["FillReport", "Filled", "fill", "part_of"]
+__all__ = ["FillReport", "Filled", "fill"]
 
 Floats = NDArray[np.float64]
 
@@ -375,31 +374,6 @@ def _reported(
         seconds=dict(filling.seconds),
     )
     return Filled(shapes, report)
-
-
-def part_of(given: Any) -> Part:
-    """The closed, valid solids of whatever a user gives as a part.
-
-    Parameters
-    ----------
-    given : shape, Workplane or path-like
-        As of :func:`fill`.
-
-    Raises
-    ------
-    ParameterError
-    ExportError
-        If a file is no STEP file or holds no shape.
-    """
-
-    if isinstance(given, str | os.PathLike):
-        return require_part(read_step(given))
-    if hasattr(given, "vals"):
-        return require_part(compound_of(shape.wrapped for shape in given.vals()))
-    shape = getattr(given, "wrapped", given)
-    if not hasattr(shape, "ShapeType"):
-        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
-    return require_part(shape)
 
 
 def _turn(degrees: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
@@ -14,21 +15,22 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
-from gyroid_cad.errors import KernelError
+from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.kernel.check import is_valid, topology
-from gyroid_cad.kernel.part import Part, measure
+from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
+from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "without_islands"]
+__all__ = ["Filling", "Made", "Outcome", "part_of", "without_islands"]
 
 Floats = NDArray[np.float64]
 
@@ -270,6 +272,31 @@ def without_islands(
         chosen[name] = [some[index] for index in kept]
         islands += islands_of([piece.volume for piece in some], kept)
     return chosen, islands
+
+
+def part_of(given: Any) -> Part:
+    """The closed, valid solids of whatever a user gives as a part.
+
+    Parameters
+    ----------
+    given : shape, Workplane or path-like
+        As of :func:`fill`.
+
+    Raises
+    ------
+    ParameterError
+    ExportError
+        If a file is no STEP file or holds no shape.
+    """
+
+    if isinstance(given, str | os.PathLike):
+        return require_part(read_step(given))
+    if hasattr(given, "vals"):
+        return require_part(compound_of(shape.wrapped for shape in given.vals()))
+    shape = getattr(given, "wrapped", given)
+    if not hasattr(shape, "ShapeType"):
+        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
+    return require_part(shape)
 
 
 def _size(made: Made) -> float:

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
 from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError
-from gyroid_cad.filling.fill import Filled, _turn, fill, part_of
-from gyroid_cad.filling.part import Filling
+from gyroid_cad.filling.fill import Filled, _turn, fill
+from gyroid_cad.filling.part import Filling, part_of
 from gyroid_cad.filling.wanted import KINDS
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from gyroid_cad.former import Moved, former_name
+
 __all__ = [
     "ExportError",
     "FitError",
@@ -11,6 +15,12 @@ __all__ = [
     "ParameterError",
     "SelfIntersectionError",
 ]
+
+_MOVED = {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}
+
+
+def __getattr__(name: str) -> Any:
+    return former_name(__name__, name, _MOVED.get(name))
 
 
 class GyroidError(Exception):

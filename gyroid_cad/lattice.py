@@ -181,7 +181,7 @@ class Lattice(LatticeParameters):
         if instances:
             require_assembly_formats(targets)
             require_settings((1, 1, 1), schema, deviation, angle)
-            self.assembly(progress).write(targets, schema, progress)
+            self.assembly(progress).write(*targets, schema=schema, progress=progress)
             return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
@@ -190,7 +190,7 @@ class Lattice(LatticeParameters):
             built = self.built(progress)
             built.write(solid, schema, self._deviation(deviation), angle, progress)
         if flat:
-            self.triangles(deviation, progress).write(flat, progress)
+            self.triangles(deviation, progress).write(*flat, progress=progress)
 
     def assembly(self, progress: Progress | None = None) -> Assembly:
         """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
@@ -269,7 +269,7 @@ class Lattice(LatticeParameters):
         Returns
         -------
         Mesh
-            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.mesh_quality`.
+            Which :meth:`gyroid_cad.Mesh.write` puts into files and :func:`gyroid_cad.mesh_quality` measures.
 
         Raises
         ------
@@ -293,7 +293,7 @@ class Lattice(LatticeParameters):
         Returns
         -------
         VolumePatches
-            For :func:`gyroid_cad.write_volumes`.
+            Which :meth:`gyroid_cad.VolumePatches.write` puts into files.
 
         Raises
         ------

@@ -40,7 +40,7 @@ from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endi
 __all__ = ["fill_command"]
 
 # Of the part and of how it is filled, whatever lattice fills it.
-_OWN = ("kind", "skin", "origin", "rotation", "drop_islands", "material_density")
+_OWN = ("kind", "skin", "origin", "rotation", "drop_islands", "keep_islands", "material_density")
 
 
 def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
@@ -87,7 +87,13 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 )
 @click.option("--origin", nargs=3, type=float, default=(0, 0, 0), metavar="X Y Z", help="Of the lattice, in mm.")
 @click.option("--rotation", nargs=3, type=float, default=(0, 0, 0), metavar="A B C", help="About x, y, z, in degrees.")
-@click.option("--drop-islands", is_flag=True, help="Leave out pieces cut off from the largest one.")
+@click.option(
+    "--drop-islands",
+    is_flag=True,
+    help="Drop all pieces not connected to the largest one; small ones, of less than a hundredth of what a cell holds, "
+    "are dropped anyway.",
+)
+@click.option("--keep-islands", is_flag=True, help="Keep small ones too.")
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
 @deviation_option

@@ -54,7 +54,7 @@ class Triangles:
         if any(FORMATS[path.suffix.lower()] == "3mf" for path in targets):
             cells = self.laid.recipe.cells
             count = self.triangulation.triangle_count
-            require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)))
+            require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)), kernel=False)
         for path in targets:
             stage = f"write {path.name}"
             if FORMATS[path.suffix.lower()] == "3mf":

@@ -120,6 +120,7 @@ def lay_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
         recipe.cells,
         _BYTES_PER_ALIKE_CELL if alike else _BYTES_PER_CELL,
         10 if alike else recipe.settings.control_points,
+        kernel=False,
     )
     seconds: dict[str, float] = {}
     with timed(seconds, "complex", progress):
@@ -130,7 +131,7 @@ def lay_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
         recipe.settings,
         recipe.tolerance,
         lambda stage: timed(seconds, stage, progress),
-        lambda control_points: require_memory(recipe.cells, _BYTES_PER_CELL, control_points),
+        lambda control_points: require_memory(recipe.cells, _BYTES_PER_CELL, control_points, kernel=False),
     )
     return LaidWall(recipe, complex, wall, refit, seconds)
 

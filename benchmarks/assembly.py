@@ -4,12 +4,12 @@ A merged solid's file grows with its cells and, a little, with its outer walls: 
 side. The three are found from blocks of 2, 3 and 4 cells a side, tried on one of 5, and carried on to 10, whose merged
 file would be some 380 MB. The assembly of 10 x 10 x 10 cells is really written, and read again by the kernel.
 
-Run: ``python -m benchmarks.assembly [--quick]``; ``--quick`` reads no more than 3 cells a side.
+Run: ``python -m benchmarks.assembly [--small]``; ``--small`` finds a, b and c from blocks of 1, 2 and 3 cells a side,
+and goes no further than 4.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,36 +19,37 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.subject import CELL_SIZE, THICKNESS
-from benchmarks.timing import Row, plain_table, print_verdicts
+from benchmarks.timing import Row, arguments_for, plain_table, print_verdicts
 from gyroid_cad.kernel.check import enclosed_volume, topology
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
 
 __all__ = ["main"]
 
-_FITTED, _TRIED, _LARGE = (2, 3, 4), 5, 10
+# Cells a side of the blocks that the three numbers are found from, of the one they are tried on, of the large one.
+_SIDES, _SMALL_SIDES = ((2, 3, 4), 5, 10), ((1, 2, 3), 3, 4)
 
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether every requirement is met."""
-    parser = argparse.ArgumentParser(description="Measure STEP assemblies against merged solids.")
-    parser.add_argument("--quick", action="store_true", help="read a small assembly back")
-    quick = parser.parse_args(arguments).quick
+    small = arguments_for("Measure STEP assemblies against merged solids.").parse_args(arguments).small
+    fitted, tried, large = _SMALL_SIDES if small else _SIDES
     lines = []
     with TemporaryDirectory() as folder:
         merged, single = {}, {}
-        for cells in (*_FITTED, _TRIED):
+        for cells in sorted({*fitted, tried}):
             merged[cells], seconds = _written(cells, Path(folder), instances=False)
             single[cells], fast = _written(cells, Path(folder), instances=True)
             lines.append(_line(cells, merged[cells], seconds, single[cells], fast))
-        bytes_of = np.polynomial.Polynomial(_coefficients({n: merged[n] for n in _FITTED}))
-        single[_LARGE], fast = _written(_LARGE, Path(folder), instances=True)
-        lines.append(_line(_LARGE, int(bytes_of(_LARGE)), None, single[_LARGE], fast))
+        bytes_of = np.polynomial.Polynomial(_coefficients({n: merged[n] for n in fitted}))
+        single[large], fast = _written(large, Path(folder), instances=True)
+        lines.append(_line(large, int(bytes_of(large)), None, single[large], fast))
+        foretold = f"merged file of {tried} a side off what {', '.join(map(str, fitted))} foretell"
         rows = [
-            Row("merged file of 5 a side off what 2, 3, 4 foretell", abs(bytes_of(5) / merged[5] - 1), 0.01),
-            Row("merged / assembly, 10 x 10 x 10 cells", bytes_of(_LARGE) / single[_LARGE], 100, 200, "x", True),
-            Row("bytes an instance", (single[_LARGE] - single[_TRIED]) / (_LARGE**3 - _TRIED**3), 700),
-            *_read_back(3 if quick else _LARGE, Path(folder)),
+            Row(foretold, abs(bytes_of(tried) / merged[tried] - 1), 0.01),
+            Row(f"merged / assembly, {large}³ cells", bytes_of(large) / single[large], 100, 200, "x", True),
+            Row("bytes an instance", (single[large] - single[tried]) / (large**3 - tried**3), 700),
+            *_read_back(large, Path(folder)),
         ]
     plain_table(
         "STEP: one solid, and one cell in many places",

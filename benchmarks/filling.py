@@ -7,18 +7,16 @@ processor time of the filling alone. A ball and a bracket read from STEP: the vo
 part's inside told by rays through a fine mesh of it, the wall by distance to dense samples of the exact surface; no
 boolean is asked.
 
-Run: ``python -m benchmarks.filling [--quick]``
+Run: ``python -m benchmarks.filling [--small]``; ``--small`` fills a part of a period, few
+cells and a small ball.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +28,11 @@ from OCP.TopoDS import TopoDS_Shape
 from benchmarks.memory import peak
 from benchmarks.solid_against_thickening import copies, thickened
 from benchmarks.subject import CELL_SIZE, THICKNESS, kernel_volume, sewn
-from benchmarks.timing import Row, best_in_turn, fresh_python, plain_table, print_verdicts
+from benchmarks.timing import ROOT, Row, arguments_for, best_in_turn, fresh_python, plain_table, print_verdicts
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.check import is_valid, topology
-from gyroid_cad.kernel.solid import realise
-from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.kernel.solid import build_solid
+from gyroid_cad.kernel.step import read_step
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.wall.complex import build_complex
@@ -47,34 +45,35 @@ TUBE = USUAL.tube
 __all__ = ["main"]
 
 Floats = NDArray[np.float64]
+Fineness = tuple[int, float, float]
 
 # The open request at another project: 5 x 5 x 5 cells of 7 mm at density 0.30.
 SIZE, DENSITY = 7.0, 0.30
-_COLUMNS = 200
-_MESH = 2e-3
+# Columns along the longest side of the part; of the mesh, mm and radians.
+_FINE, _COARSE = (200, 2e-3, 0.02), (16, 2e-2, 0.2)
+# Cells a side of the block, sides of the box in its middle in periods, and repeats.
+_PERIOD, _SMALL_BOX = (2, 1.0, 2), (1, 0.3, 1)
 _DENSE = 49
 
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether every requirement is met."""
-    parser = argparse.ArgumentParser(description="Fill boxes, a ball and a bracket.")
-    parser.add_argument("--quick", action="store_true", help="leave out what takes minutes")
-    quick = parser.parse_args(arguments).quick
-    rows = [*_one_period(), *([] if quick else _many_cells())]
+    small = arguments_for("Fill boxes, a ball and a bracket.").parse_args(arguments).small
+    rows = [*_against_offset(*(_SMALL_BOX if small else _PERIOD)), *_many_cells(1 if small else 5)]
     passed = print_verdicts("Boxes", rows)
-    return print_verdicts("Free forms", _free_forms(quick)) and passed
+    return print_verdicts("Free forms", _free_forms(small)) and passed
 
 
-def _one_period() -> list[Row]:
-    """The box of one period in the middle of 2 x 2 x 2 cells."""
-    lattice = _outwards(thickened(sewn(copies(2))))
-    box = _box(0.5 * CELL_SIZE, 1.5 * CELL_SIZE)
+def _against_offset(cells: int, side: float, repeats: int) -> list[Row]:
+    """A box of so many periods a side in the middle of a block of so many cells a side."""
+    lattice = _outwards(thickened(sewn(copies(cells))))
+    box = _box((cells - side) / 2 * CELL_SIZE, (cells + side) / 2 * CELL_SIZE)
     (ours, made), (theirs, common) = best_in_turn(
-        2, lambda: fill(box, CELL_SIZE, THICKNESS), lambda: BRepAlgoAPI_Common(lattice, box).Shape()
+        repeats, lambda: fill(box, CELL_SIZE, THICKNESS), lambda: BRepAlgoAPI_Common(lattice, box).Shape()
     )
-    exact = TUBE.density(THICKNESS / CELL_SIZE) * CELL_SIZE**3
+    exact = TUBE.density(THICKNESS / CELL_SIZE) * (side * CELL_SIZE) ** 3
     return [
-        Row("one period: simple offset, cut / ours", theirs / ours, 5, unit="x", at_least=True),
+        Row(f"{side:g} periods a side: simple offset, cut / ours", theirs / ours, 5, unit="x", at_least=True),
         Row("  ours: volume off the tube formula", abs(made.report.volume / exact - 1), 1e-4),
         Row("  theirs: volume off the tube formula", abs(kernel_volume(common) / exact - 1), remark=_state(common)),
     ]
@@ -90,35 +89,39 @@ def _state(shape: TopoDS_Shape) -> str:
     return f"{sound}, {topology(shape).faces} faces"
 
 
-def _many_cells() -> list[Row]:
-    boolean, five, ten = (_alone(what) for what in ("boolean", "5", "10"))
+def _many_cells(cells: int) -> list[Row]:
+    """So many cells a side by one boolean and by sections, and twice as many by sections."""
+    boolean, some, more = (_alone(*what) for what in (("boolean", cells), ("fill", cells), ("fill", 2 * cells)))
     headings = ("", "processor time", "peak memory", "faces", "density")
     lines = [
-        (name, f"{some['seconds']:.1f} s", f"{some['peak'] / 1e9:.2f} GB", f"{some['faces']}", f"{some['density']:.6f}")
-        for name, some in (("5³, one boolean", boolean), ("5³, ours", five), ("10³, ours", ten))
+        (name, f"{took['seconds']:.1f} s", f"{took['peak'] / 1e9:.2f} GB", f"{took['faces']}", f"{took['density']:.6f}")
+        for name, took in (
+            (f"{cells}³, one boolean", boolean),
+            (f"{cells}³, ours", some),
+            (f"{2 * cells}³, ours", more),
+        )
     ]
     plain_table(f"Cells of {SIZE:g} mm at density {DENSITY}", headings, lines)
     return [
-        Row("5³: one boolean / ours", boolean["seconds"] / five["seconds"], 3, 8, "x", at_least=True),
-        Row("5³: density off by", abs(five["density"] - DENSITY), 2e-4),
-        Row("5³: peak memory", five["peak"] / 1e9, 2, unit=" GB"),
-        Row("10³ / 5³: time", ten["seconds"] / five["seconds"], 8, 4, "x"),
+        Row(f"{cells}³: one boolean / ours", boolean["seconds"] / some["seconds"], 3, 8, "x", at_least=True),
+        Row(f"{cells}³: density off by", abs(some["density"] - DENSITY), 2e-4),
+        Row(f"{cells}³: peak memory", some["peak"] / 1e9, 2, unit=" GB"),
+        Row(f"{2 * cells}³ / {cells}³: time", more["seconds"] / some["seconds"], 8, 4, "x"),
     ]
 
 
-def _alone(what: str) -> dict[str, float]:
-    result: dict[str, float] = json.loads(fresh_python("-m", "benchmarks.filling", "--alone", what))
+def _alone(what: str, cells: int) -> dict[str, float]:
+    result: dict[str, float] = json.loads(fresh_python("-m", "benchmarks.filling", "--alone", what, str(cells)))
     return result
 
 
-def _run_alone(what: str) -> None:
+def _run_alone(what: str, cells: int) -> None:
     """Fill, or cut by one boolean, and print what it took."""
-    cells = 5 if what == "boolean" else int(what)
     low, high = 0.5 * SIZE, (cells + 0.5) * SIZE
     box = _box(low, high)
     if what == "boolean":
         thickness = float(TUBE.thickness(DENSITY)) * SIZE
-        lattice = realise(build_wall(build_complex((cells + 1,) * 3), fit_patch(), SIZE, thickness))
+        lattice = build_solid(build_wall(build_complex((cells + 1,) * 3), fit_patch(), SIZE, thickness))
         start = time.process_time()
         shape = BRepAlgoAPI_Common(lattice, box).Shape()
         seconds, faces = time.process_time() - start, topology(shape).faces
@@ -131,23 +134,24 @@ def _run_alone(what: str) -> None:
     print(json.dumps({"seconds": seconds, "peak": peak(), "faces": faces, "density": density}))
 
 
-def _free_forms(quick: bool) -> list[Row]:
-    ball = BRepPrimAPI_MakeSphere(gp_Pnt(1.0, 2.0, 3.0), 7.0 if quick else 12.0).Shape()
-    rows = _against_columns("ball", ball)
-    if not quick:
-        from examples.light_bracket import bracket
-
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "bracket.step"
-            write_step(bracket().val().wrapped, path)
-            rows += _against_columns("bracket from STEP", read_step(path))
-    return rows
+def _free_forms(small: bool) -> list[Row]:
+    if small:
+        return _against_columns("ball", _ball(3.0), _COARSE)
+    bracket = read_step(ROOT / "examples" / "bracket.step")
+    return [
+        *_against_columns("ball", _ball(12.0), _FINE),
+        *_against_columns("bracket from STEP", bracket, _FINE),
+    ]
 
 
-def _against_columns(name: str, part: TopoDS_Shape) -> list[Row]:
+def _ball(radius: float) -> TopoDS_Shape:
+    return BRepPrimAPI_MakeSphere(gp_Pnt(1.0, 2.0, 3.0), radius).Shape()
+
+
+def _against_columns(name: str, part: TopoDS_Shape, fineness: Fineness) -> list[Row]:
     report = fill(part, SIZE, density=DENSITY).report
     thickness = float(TUBE.thickness(DENSITY)) * SIZE
-    expected = _volume_by_columns(part, thickness)
+    expected = _volume_by_columns(part, thickness, fineness)
     remark = f"{report.faces} faces, {report.solids} solids, {sum(report.seconds.values()):.0f} s"
     return [
         Row(f"{name}: volume off the columns'", abs(report.volume / expected - 1), 1e-3, remark=remark),
@@ -155,11 +159,12 @@ def _against_columns(name: str, part: TopoDS_Shape) -> list[Row]:
     ]
 
 
-def _volume_by_columns(part: TopoDS_Shape, thickness: float) -> float:
+def _volume_by_columns(part: TopoDS_Shape, thickness: float, fineness: Fineness) -> float:
     """Volume of the wall in a part: points at random places of the cells of a grid, along rays through a mesh."""
-    triangles = _mesh(part)
+    columns, deviation, angle = fineness
+    triangles = _mesh(part, deviation, angle)
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    step = float((high - low).max()) / _COLUMNS
+    step = float((high - low).max()) / columns
     random = np.random.default_rng(0)
     along = [np.arange(low[axis], high[axis], step) for axis in range(3)]
     cell = covering_complex(np.zeros(3), np.full(3, SIZE), Frame(np.zeros(3), np.eye(3)), SIZE, 0.0)
@@ -191,11 +196,11 @@ def _crossings(triangles: Floats, at: Floats) -> Floats:
     return np.asarray(np.sum(shares * x, axis=1) / shares.sum(axis=1))
 
 
-def _mesh(part: TopoDS_Shape) -> Floats:
-    """A fine mesh's triangles; shape (n, 3, 3)."""
+def _mesh(part: TopoDS_Shape, deviation: float, angle: float) -> Floats:
+    """The triangles of a mesh; shape (n, 3, 3)."""
     import cadquery as cq
 
-    vertices, triangles = cq.Shape.cast(part).tessellate(_MESH, 0.02)
+    vertices, triangles = cq.Shape.cast(part).tessellate(deviation, angle)
     return np.array([vertex.toTuple() for vertex in vertices])[np.array(triangles)]
 
 
@@ -205,6 +210,6 @@ def _box(low: float, high: float) -> TopoDS_Shape:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--alone"]:
-        _run_alone(sys.argv[2])
+        _run_alone(sys.argv[2], int(sys.argv[3]))
     else:
         sys.exit(not main(sys.argv[1:]))

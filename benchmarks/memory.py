@@ -4,12 +4,11 @@ Every figure is the peak resident memory of a fresh process; the slope over the 
 cell costs, the intercept what the interpreter and the kernel cost. The check of available memory before a
 build rests on these slopes.
 
-Run: ``python -m benchmarks.memory [--sides 2 4 6]``
+Run: ``python -m benchmarks.memory [--sides 2 4 6] [--small]``; ``--small`` is files of one cell and eight.
 """
 
 from __future__ import annotations
 
-import argparse
 import resource
 import sys
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.timing import fresh_python, plain_table
+from benchmarks.timing import arguments_for, fresh_python, plain_table
 
 __all__ = ["main", "peak"]
 
@@ -29,10 +28,12 @@ _STATUS = Path("/proc/self/status")
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; nothing is required, so always True."""
-    parser = argparse.ArgumentParser(description="Measure peak memory in fresh processes.")
+    parser = arguments_for("Measure peak memory in fresh processes.")
     parser.add_argument("--sides", type=int, nargs="+", default=[2, 4, 6], help="cells along a side (default 2 4 6)")
-    sides = parser.parse_args(arguments).sides
-    measured = {kind: np.array([_measured(kind, side) for side in sides]) for kind in _KINDS}
+    options = parser.parse_args(arguments)
+    sides = [1, 2] if options.small else options.sides
+    kinds = _KINDS[1:] if options.small else _KINDS
+    measured = {kind: np.array([_measured(kind, side) for side in sides]) for kind in kinds}
     cells = np.array(sides) ** 3
     _print_peaks(cells, measured)
     _print_slopes(cells, measured)
@@ -41,14 +42,14 @@ def main(arguments: Sequence[str] = ()) -> bool:
 
 def _print_peaks(cells: np.ndarray, measured: dict[str, np.ndarray]) -> None:
     headings = ("peak memory, MB; file size, MB", *(f"{count} cells" for count in cells))
-    lines = [(kind, *(f"{peak / 1e6:.0f}; {size / 1e6:.1f}" for peak, size in measured[kind])) for kind in _KINDS]
+    lines = [(kind, *(f"{peak / 1e6:.0f}; {size / 1e6:.1f}" for peak, size in rows)) for kind, rows in measured.items()]
     plain_table("Peak memory of a fresh process", headings, lines)
 
 
 def _print_slopes(cells: np.ndarray, measured: dict[str, np.ndarray]) -> None:
     lines = []
-    for kind in _KINDS:
-        peak, size = (np.polyfit(cells, column, 1) for column in measured[kind].T)
+    for kind, columns in measured.items():
+        peak, size = (np.polyfit(cells, column, 1) for column in columns.T)
         lines.append((kind, f"{peak[1] / 1e6:.0f} MB", f"{peak[0] / 1e3:.0f} kB", f"{size[0] / 1e3:.0f} kB"))
     plain_table("What a cell costs", ("up to", "before the first", "memory a cell", "file a cell"), lines)
 

@@ -4,7 +4,7 @@ The bare nodes are those of every patch by one matrix product: tensor products o
 the control points of both faces of all patches, shared nodes over and over. Ours makes each node once, and the
 elements. Both in a process with one thread, for ours needs no more, by processor time; writing beside it.
 
-Run: ``python -m benchmarks.meshes``
+Run: ``python -m benchmarks.meshes [--small]``; ``--small`` has 4 x 4 elements a patch.
 """
 
 from __future__ import annotations
@@ -18,30 +18,33 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.subject import CELL_SIZE
-from benchmarks.timing import Row, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
+from benchmarks.timing import Row, arguments_for, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
 from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.finite_elements.files import MESH_FORMATS, write_mesh
-from gyroid_cad.mesh.finite_elements.hexahedra import hexahedra, quadrilaterals
+from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra, quadrilaterals
 from gyroid_cad.nurbs.surface import basis
 
 __all__ = ["main"]
 
-_CELLS, _SUBDIVISIONS = (4, 3, 2), 20
-_ELEMENTS = 230_400
+_CELLS, _SUBDIVISIONS, _FEW_SUBDIVISIONS = (4, 3, 2), 20, 4
+_PATCHES = 576
 _THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether every requirement is met."""
-    seconds = json.loads(fresh_python("-m", "benchmarks.meshes", "--alone", **_THREAD))
+    small = arguments_for("Mesh the paper's lattice.").parse_args(arguments).small
+    subdivisions = _FEW_SUBDIVISIONS if small else _SUBDIVISIONS
+    expected = _PATCHES * subdivisions**2
+    seconds = json.loads(fresh_python("-m", "benchmarks.meshes", "--alone", str(subdivisions), **_THREAD))
     lattice = Lattice(_CELLS, CELL_SIZE, 0.1 * CELL_SIZE)
-    quality = mesh_quality(lattice.hexahedra(_SUBDIVISIONS, 3))
+    quality = mesh_quality(lattice.hexahedra(subdivisions, 3))
     scaled = quality.measures["scaled_jacobian"]
-    counts = len(lattice.quadrilaterals(_SUBDIVISIONS).cells), len(lattice.hexahedra(_SUBDIVISIONS).cells)
+    counts = len(lattice.quadrilaterals(subdivisions).cells), len(lattice.hexahedra(subdivisions).cells)
     rows = [
-        Row("quadrilaterals off the paper's number", abs(counts[0] - _ELEMENTS), 0),
-        Row("hexahedra off the paper's number", abs(counts[1] - _ELEMENTS), 0),
+        Row("quadrilaterals off the paper's number", abs(counts[0] - expected), 0),
+        Row("hexahedra off the paper's number", abs(counts[1] - expected), 0),
         Row("hexahedra / nodes by one product", seconds["hexahedra"] / seconds["product"], 5, 2, "x"),
         Row("  and looked at for being inside out", seconds["checked"] / seconds["product"], unit="x"),
         Row("quadrilaterals / nodes of both faces by one product", seconds["quads"] / seconds["product"], unit="x"),
@@ -50,25 +53,24 @@ def main(arguments: Sequence[str] = ()) -> bool:
         Row("  turned inside out", quality.inverted, 0),
     ]
     passed = print_verdicts("The paper's mesh", rows)
-    _print_writing(lattice)
+    _print_writing(lattice.hexahedra(subdivisions))
     return passed
 
 
-def _print_writing(lattice: Lattice) -> None:
-    mesh = lattice.hexahedra(_SUBDIVISIONS)
+def _print_writing(mesh: Mesh) -> None:
     lines = []
     with TemporaryDirectory() as folder:
         for ending in MESH_FORMATS:
             path = Path(folder) / f"mesh{ending}"
             seconds, _ = best_of(lambda path=path: write_mesh(mesh, path), 1)  # type: ignore[misc]
             lines.append((ending, f"{seconds:.2f} s", f"{path.stat().st_size / 1e6:.1f} MB"))
-    plain_table("230,400 hexahedra to files", ("", "processor time", "size"), lines)
+    plain_table(f"{len(mesh.cells):,} hexahedra to files", ("", "processor time", "size"), lines)
 
 
-def _run_alone() -> None:
+def _run_alone(subdivisions: int) -> None:
     lattice = Lattice(_CELLS, CELL_SIZE, 0.1 * CELL_SIZE)
-    wall = lattice.laid().wall
-    along = basis(wall.knots, 3, np.linspace(-1, 1, _SUBDIVISIONS + 1))
+    wall = lattice.fitted().wall
+    along = basis(wall.knots, 3, np.linspace(-1, 1, subdivisions + 1))
     functions = np.kron(along, along)
     nets = wall.nets[wall.patch_net] + wall.shifts[wall.patch_shift][:, np.newaxis, np.newaxis, np.newaxis]
     control_points = np.ascontiguousarray(nets.reshape(-1, functions.shape[1], 3).swapaxes(0, 1))
@@ -76,9 +78,9 @@ def _run_alone() -> None:
     product, ours, quads, checked = best_in_turn(
         20,
         lambda: functions @ control_points,
-        lambda: hexahedra(wall, _SUBDIVISIONS),
-        lambda: quadrilaterals(wall, _SUBDIVISIONS),
-        lambda: lattice.hexahedra(_SUBDIVISIONS),
+        lambda: hexahedra(wall, subdivisions),
+        lambda: quadrilaterals(wall, subdivisions),
+        lambda: lattice.hexahedra(subdivisions),
     )
     names = ("product", "hexahedra", "quads", "checked")
     print(json.dumps({name: some[0] for name, some in zip(names, (product, ours, quads, checked), strict=True)}))
@@ -86,6 +88,6 @@ def _run_alone() -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--alone"]:
-        _run_alone()
+        _run_alone(int(sys.argv[2]))
     else:
         sys.exit(not main(sys.argv[1:]))

@@ -4,7 +4,8 @@ The edges are given; where the interior lies between them is free, and each fami
 coefficients of its own. This scans both round the chosen values, in parts of the patch's size, and shows plain
 transfinite interpolation (no shift) beside, for the 10 x 10 fit.
 
-Run: ``python -m benchmarks.parameterisation [--steps N] [--width W]``
+Run: ``python -m benchmarks.parameterisation [--steps N] [--width W] [--small]``; ``--small`` scans one surface, a step
+to each side.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.timing import Row, plain_table, print_verdicts
-from gyroid_cad.surface.families import SURFACES
-from gyroid_cad.surface.fit import FitReport, FitSettings, fit_patch, fit_report
+from benchmarks.timing import Row, arguments_for, plain_table, print_verdicts
+from gyroid_cad.surface.families import SURFACES, USUAL
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.fit_report import FitReport, fit_report
 from gyroid_cad.surface.weierstrass import Family
 
 __all__ = ["main"]
@@ -32,8 +34,9 @@ _NEAR_THE_BEST = 1.05
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether the chosen values are near the best of the scan."""
     options = _parsed(arguments)
-    around = options.width * np.linspace(-1, 1, 2 * options.steps + 1)
-    results = [_scanned(surface.family, around) for surface in SURFACES.values()]
+    steps, surfaces = (1, [USUAL]) if options.small else (options.steps, list(SURFACES.values()))
+    around = options.width * np.linspace(-1, 1, 2 * steps + 1)
+    results = [_scanned(surface.family, around) for surface in surfaces]
     return all(results)
 
 
@@ -61,7 +64,7 @@ def _rows(chosen: FitReport, plain: FitReport, best: Shifts, at_best: FitReport)
 
 
 def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Scan the interior shifts of the parameterisation.")
+    parser = arguments_for("Scan the interior shifts of the parameterisation.")
     parser.add_argument("--steps", type=int, default=2, help="to each side of the chosen values (default 2)")
     parser.add_argument("--width", type=float, default=4e-3, help="of the scan to each side (default 0.004)")
     return parser.parse_args(arguments)

@@ -7,7 +7,8 @@ Ours goes from the fitted patch through the cell complex and the wall to the sol
 So a way round that growth is timed beside: one cell sewn, its copies sewn into a row, rows into a layer,
 layers into the block. It has no side walls, and gives no solid.
 
-Run: ``python -m benchmarks.solid_against_sewing [--cells N] [--repeats N]``
+Run: ``python -m benchmarks.solid_against_sewing [--cells N] [--repeats N] [--small]``; ``--small`` builds and sews two
+cells a side, once.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from OCP.Geom import Geom_BSplineSurface
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from benchmarks.subject import CELL_SIZE, block, block_solid, sewn, translation
-from benchmarks.timing import Row, best_of, plain_table, print_verdicts
+from benchmarks.timing import Row, arguments_for, best_of, plain_table, print_verdicts
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.surfaces import kernel_surface
@@ -67,13 +68,16 @@ def main(arguments: Sequence[str] = ()) -> bool:
 
 
 def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Build a block of cells, and sew the same faces.")
+    parser = arguments_for("Build a block of cells, and sew the same faces.")
     parser.add_argument(
         "--cells", type=int, default=10, help="along each side (default 10: 48,000 faces and side walls)"
     )
     parser.add_argument("--repeats", type=int, default=3, help="of our build; the best counts (default 3)")
     parser.add_argument("--sewing-repeats", type=int, default=1, help="of the sewing (default 1: it is slow)")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.small:
+        options.cells, options.repeats = 2, 1
+    return options
 
 
 def _figures(seconds: float, shape: TopoDS_Shape) -> tuple[str, str, str, str]:
@@ -87,8 +91,8 @@ def _separate_faces(wall: Wall) -> list[TopoDS_Face]:
     locations = [translation(shift) for shift in wall.shifts.tolist()]
     free = wall.complex.free[wall.complex.patch_edges].tolist()
     separate = []
-    for net, shift, free_edges in zip(wall.patch_net.tolist(), wall.patch_shift.tolist(), free, strict=True):
-        surfaces = [*kinds.surfaces[net], *(kinds.side_walls[net, k] for k in range(4) if free_edges[k])]
+    for net, shift, boundary_edges in zip(wall.patch_net.tolist(), wall.patch_shift.tolist(), free, strict=True):
+        surfaces = [*kinds.surfaces[net], *(kinds.side_walls[net, k] for k in range(4) if boundary_edges[k])]
         for surface in surfaces:
             face = BRepBuilderAPI_MakeFace(surface, TOLERANCE).Face()
             separate.append(face.Located(locations[shift]))

@@ -7,7 +7,7 @@ ways make the same part; the fit, common to both, is not timed. Ours goes to STE
 through the kernel's writer, without curves in the parameter plane as in ours; what the kernel's default settings
 and ``write_step`` make of it is shown beside.
 
-Run: ``python -m benchmarks.solid_against_thickening [--cells N] [--repeats N]``
+Run: ``python -m benchmarks.solid_against_thickening [--cells N] [--repeats N] [--small]``; ``--small`` is one cell.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from benchmarks.subject import CELL_SIZE, THICKNESS, block_solid, kernel_volume, sewn, translation
-from benchmarks.timing import Row, best_in_turn, plain_table, print_verdicts
+from benchmarks.timing import Row, arguments_for, best_in_turn, plain_table, print_verdicts
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.step import write_step
@@ -50,17 +50,17 @@ def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether every requirement is met."""
     options = _parsed(arguments)
     # Thickening leaves its marks on the shell, and a shell thickened twice gives a file 2.6 times as large: sew anew.
-    (ours, solid), (theirs, thickened), (sewing, shell) = best_in_turn(
+    (ours, solid), (theirs, thick), (sewing, shell) = best_in_turn(
         options.repeats,
         lambda: block_solid(options.cells),
         lambda: thickened(sewn(copies(options.cells))),
         lambda: sewn(copies(options.cells)),
     )
-    sizes = [_step_bytes(shape) for shape in (solid, thickened)]
+    sizes = [_step_bytes(shape) for shape in (solid, thick)]
     our_step, (_, kernel_step, default_step) = sizes[0][0], sizes[1]
     lines = [
         ("ours, patch to solid", *_figures(ours, solid, options.cells), *map(_megabytes, sizes[0])),
-        ("copied, sewn, thickened", *_figures(theirs, thickened, options.cells), *map(_megabytes, sizes[1])),
+        ("copied, sewn, thickened", *_figures(theirs, thick, options.cells), *map(_megabytes, sizes[1])),
         ("  of it, before thickening", f"{sewing:.2f} s", f"{topology(shell).faces}", *6 * ("",)),
     ]
     plain_table(f"{options.cells}³ cells to a solid", _HEADINGS, lines)
@@ -74,10 +74,13 @@ def main(arguments: Sequence[str] = ()) -> bool:
 
 
 def _parsed(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Build a block of cells, and thicken a sewn mid-surface.")
+    parser = arguments_for("Build a block of cells, and thicken a sewn mid-surface.")
     parser.add_argument("--cells", type=int, default=3, help="along each side (default 3)")
     parser.add_argument("--repeats", type=int, default=3, help="the best counts (default 3)")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.small:
+        options.cells, options.repeats = 1, 1
+    return options
 
 
 def _figures(seconds: float, shape: TopoDS_Shape, cells: int) -> tuple[str, str, str, str, str]:

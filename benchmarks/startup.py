@@ -3,18 +3,17 @@
 Importing and the first fit are timed inside the process, after the interpreter has started; building one
 cell to STEP and importing CadQuery are timed as whole processes.
 
-Run: ``python -m benchmarks.startup [--repeats N]``
+Run: ``python -m benchmarks.startup [--repeats N] [--small]``; ``--small`` starts each once.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.timing import Row, fresh_python, print_verdicts, seconds_of_process
+from benchmarks.timing import Row, arguments_for, fresh_python, print_verdicts, seconds_of_process
 
 __all__ = ["main"]
 
@@ -36,12 +35,12 @@ _BUILD = ("-m", "gyroid_cad", "build", "--cells", "1", "1", "1", "--cell-size", 
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the table; returns whether every requirement is met."""
-    parser = argparse.ArgumentParser(description="Time the start of fresh processes.")
+    parser = arguments_for("Time the start of fresh processes.")
     parser.add_argument("--repeats", type=int, default=5, help="the best counts (default 5)")
-    repeats = parser.parse_args(arguments).repeats
+    options = parser.parse_args(arguments)
     with TemporaryDirectory() as folder:
         output = str(Path(folder) / "cell.step")
-        rounds = [_one_round(output) for _ in range(repeats)]
+        rounds = [_one_round(output) for _ in range(1 if options.small else options.repeats)]
     importing, fitting, building, cadquery, kernel = (min(times) for times in zip(*rounds, strict=True))
     return print_verdicts(
         "Start",

@@ -11,7 +11,7 @@ from OCP.GProp import GProp_GProps
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.kernel.solid import realise
+from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import Wall, build_wall
@@ -31,7 +31,7 @@ def block(cells: int) -> Wall:
 
 def block_solid(cells: int) -> TopoDS_Shape:
     """From the fitted patch to the closed solid of a cube of ``cells`` cells a side."""
-    return realise(block(cells))
+    return build_solid(block(cells))
 
 
 def kernel_volume(shape: TopoDS_Shape) -> float:

@@ -7,6 +7,7 @@ neither side alone, however long the one runs and however short the other. Whole
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
@@ -19,7 +20,17 @@ from typing import TypeVar
 from rich.console import Console
 from rich.table import Table
 
-__all__ = ["Row", "best_in_turn", "best_of", "fresh_python", "plain_table", "print_verdicts", "seconds_of_process"]
+__all__ = [
+    "ROOT",
+    "Row",
+    "arguments_for",
+    "best_in_turn",
+    "best_of",
+    "fresh_python",
+    "plain_table",
+    "print_verdicts",
+    "seconds_of_process",
+]
 
 ROOT = Path(__file__).resolve().parent.parent
 _NARROWEST = 130
@@ -72,6 +83,17 @@ class Row:
     def cells(self) -> tuple[str, str, str, str, str, str]:
         measured = f"{_shown(self.measured)}{self.unit}"
         return self.what, measured, self._bound(self.required), self._bound(self.aim), self.verdict, self.remark
+
+
+def arguments_for(description: str) -> argparse.ArgumentParser:
+    """Parser of a benchmark's command line, with the one option that all of them have.
+
+    ``--small`` runs every step at the least size at which it can be run: it shows that a benchmark works, and its
+    ratios mean little.
+    """
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--small", action="store_true", help="the least size at which every step runs")
+    return parser
 
 
 def best_of(task: Callable[[], Result], repeats: int) -> tuple[float, Result]:

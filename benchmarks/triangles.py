@@ -6,12 +6,12 @@ so that the deviation alone decides. Whether the triangles are closed is asked o
 is compared, by the clock, with writing the same bytes in one piece, both synchronised with the disk before they appear.
 Memory is that of a fresh process that goes from the description of 10 x 10 x 10 cells to the file.
 
-Run: ``python -m benchmarks.triangles [--cells N] [--repeats N] [--quick]``
+Run: ``python -m benchmarks.triangles [--cells N] [--repeats N] [--small]``; ``--small`` is one cell, once, with files
+of a few cells.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import Row, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
+from benchmarks.timing import Row, arguments_for, best_in_turn, best_of, fresh_python, plain_table, print_verdicts
 from gyroid_cad.common.files import replacing
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.measuring import enclosed_volume
 from gyroid_cad.mesh.triangles.stl import write_stl
@@ -31,39 +32,36 @@ from gyroid_cad.wall.offset import Wall
 
 __all__ = ["main"]
 
-
 # In mm, of 10 mm cells: what the ratio is asked at, what the order is measured at, and the usual one of a lattice.
 _DEVIATION, _DEVIATIONS, _USUAL_DEVIATION = 0.05, (0.2, 0.1, 0.05, 0.025, 0.0125), 0.01
 # In degrees: the least strict that means anything, and the usual one.
 _LOOSE_ANGLE, _USUAL_ANGLE = 80.0, 15.0
-_LARGE = 10
 _COUNTS = (8, 16, 32, 64)
 
 
 def main(arguments: Sequence[str] = ()) -> bool:
     """Print the tables; returns whether every requirement is met."""
-    parser = argparse.ArgumentParser(description="Measure triangles against the kernel's mesher.")
+    parser = arguments_for("Measure triangles against the kernel's mesher.")
     parser.add_argument("--cells", type=int, default=3, help="along a side, for time and closedness (default 3)")
     parser.add_argument("--repeats", type=int, default=5, help="the best counts (default 5)")
-    parser.add_argument("--quick", action="store_true", help="a coarse large file")
     given = parser.parse_args(arguments)
     from benchmarks.subject import block
 
-    cells = given.cells
+    cells, repeats, written, large = (1, 1, 2, 2) if given.small else (given.cells, given.repeats, 6, 10)
     wall = block(cells)
-    rows = [*_against_mesher(wall, given.repeats), *_soundness(wall), *_volume(wall)]
+    rows = [*_against_mesher(wall, repeats), *_soundness(wall), *_volume(wall)]
     _print_deviations(wall)
     with TemporaryDirectory() as folder:
-        rows += _writing(block(6), Path(folder), given.repeats)
-        rows += _memory(Path(folder) / "large.stl", _DEVIATION if given.quick else _USUAL_DEVIATION)
+        rows += _writing(block(written), Path(folder), repeats)
+        rows += _memory(Path(folder) / "large.stl", large)
     return print_verdicts(f"Triangles, {cells} x {cells} x {cells} cells of 10 mm, wall 0.8 mm", rows)
 
 
 def _against_mesher(wall: Wall, repeats: int) -> list[Row]:
     """Processor time of both, all threads together, and how many triangles each makes of the deviation."""
-    from gyroid_cad.kernel.solid import realise
+    from gyroid_cad.kernel.solid import build_solid
 
-    solid = realise(wall)
+    solid = build_solid(wall)
 
     def ours() -> int:
         return len(indexed_triangles(triangulated(wall, _DEVIATION))[1])
@@ -105,11 +103,10 @@ def _counted(meshed: Any) -> tuple[int, float]:
     from OCP.TopAbs import TopAbs_FACE
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
     count, explorer = 0, TopExp_Explorer(meshed, TopAbs_FACE)
     while explorer.More():
-        count += BRep_Tool.Triangulation_s(TopoDS.Face_s(explorer.Current()), TopLoc_Location()).NbTriangles()
+        count += BRep_Tool.Triangulation_s(as_face(explorer.Current()), TopLoc_Location()).NbTriangles()
         explorer.Next()
     properties = GProp_GProps()
     BRepGProp.VolumeProperties_s(meshed, properties, False, False, True)
@@ -136,7 +133,7 @@ def _soundness(wall: Wall) -> list[Row]:
 
 
 def _volume(wall: Wall) -> list[Row]:
-    """How fast the volume nears the wall's, before corners are laid off to make up for it."""
+    """How fast the volume nears the wall's, before corners are offset to make up for it."""
     missing = []
     for count in _COUNTS:
         patches, edges = np.full(wall.complex.patch_count, count), np.full(wall.complex.edge_count, count)
@@ -154,7 +151,7 @@ def _print_deviations(wall: Wall) -> None:
             (
                 f"{deviation:g}",
                 f"{made.deviation:.2e}",
-                f"{made.laid_off:.1e}",
+                f"{made.volume_offset:.1e}",
                 f"{made.patch_steps.max()}",
                 f"{made.triangle_count:,}",
                 f"{made.volume / wall.volume() - 1:+.1e}",
@@ -162,7 +159,7 @@ def _print_deviations(wall: Wall) -> None:
         )
     plain_table(
         "What a deviation takes",
-        ("asked for, mm", "measured", "laid off", "squares along a patch", "triangles", "volume off by"),
+        ("asked for, mm", "measured", "offset", "squares along a patch", "triangles", "volume off by"),
         lines,
     )
 
@@ -198,26 +195,26 @@ def _seconds(task: Callable[[], None]) -> float:
     return perf_counter() - start
 
 
-def _memory(path: Path, deviation: float) -> list[Row]:
-    """Peak of a fresh process that writes the large block."""
-    peak, size, seconds = fresh_python("-m", "benchmarks.triangles", "--alone", str(path), str(deviation)).split()
-    remark = f"{int(size) / 1e6:.0f} MB of STL at {deviation:g} mm, {float(seconds):.3g} s"
-    what = f"peak memory, {_LARGE} x {_LARGE} x {_LARGE} cells to STL"
+def _memory(path: Path, cells: int) -> list[Row]:
+    """Peak of a fresh process that writes a block of so many cells a side."""
+    peak, size, seconds = fresh_python("-m", "benchmarks.triangles", "--alone", str(path), str(cells)).split()
+    remark = f"{int(size) / 1e6:.0f} MB of STL at {_USUAL_DEVIATION:g} mm, {float(seconds):.3g} s"
+    what = f"peak memory, {cells} x {cells} x {cells} cells to STL"
     return [Row(what, int(peak) / 1e9, 1, None, " GB", remark=remark)]
 
 
-def _alone(path: str, deviation: float) -> None:
+def _alone(path: str, cells: int) -> None:
     """From the description to the file; print this process's peak, the file's size and the seconds it took."""
     from benchmarks.memory import peak
     from gyroid_cad import Lattice
 
     start = perf_counter()
-    Lattice((_LARGE,) * 3, 10.0, 0.8).write(path, deviation=deviation)
+    Lattice((cells,) * 3, 10.0, 0.8).write(path, deviation=_USUAL_DEVIATION)
     print(peak(), Path(path).stat().st_size, perf_counter() - start)
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--alone"]:
-        _alone(sys.argv[2], float(sys.argv[3]))
+        _alone(sys.argv[2], int(sys.argv[3]))
     else:
         sys.exit(not main(sys.argv[1:]))

@@ -12,4 +12,4 @@ report = lattice.report()
 print(
     f"density {density(15, 15, 0):.2f} at the axis, {density(0, 15, 0):.2f} at the sides, {report.density:.3f} in all"
 )
-print(f"wall {report.thinnest:.3f} to {report.thickest:.3f} mm, volume {report.volume:.3f} mm3")
+print(f"wall {report.min_thickness:.3f} to {report.max_thickness:.3f} mm, volume {report.volume:.3f} mm3")

@@ -7,5 +7,5 @@ lattice.write("closed_cylinder.step")
 
 report = lattice.report()
 print(f"closed: {report.closed}, solids: {report.solids}, faces: {report.faces}")
-print(f"{report.free_edges} free edges of patches, all at the two ends, inside and outside")
+print(f"{report.boundary_edges} boundary edges of patches, all at the two ends, inside and outside")
 print(f"volume {report.volume:.3f} mm3, exact {report.volume_exact:.3f} mm3")

@@ -11,7 +11,7 @@ bumper = (
     .pushPoints([(-10, 0), (10, 0)])
     .gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8, centered=(True, True, False))
 )
-labyrinth = cq.Workplane().box(8, 8, 8).gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8, combine="cut")
+network = cq.Workplane().box(8, 8, 8).gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8, combine="cut")
 
 cq.exporters.export(bumper, "bumper.step")
-print(f"bumper {bumper.val().Volume():.1f} mm3, labyrinth {labyrinth.val().Volume():.1f} mm3")
+print(f"bumper {bumper.val().Volume():.1f} mm3, network {network.val().Volume():.1f} mm3")

@@ -8,5 +8,5 @@ lattice = Lattice(cells=(4, 3, 2), cell_size=2 * BOUNDING_CELL, thickness=0.08 *
 lattice.write("paper_4x3x2.step")
 
 report = lattice.report()
-print(f"{report.patches} patches, {report.faces} faces, {report.pinch_lines} pinch lines")
+print(f"{report.patches} patches, {report.faces} faces, {report.non_manifold_edges} non-manifold edges")
 print(f"volume {report.volume:.6f} mm3, exact {report.volume_exact:.6f} mm3")

@@ -8,6 +8,6 @@ lattice.write("paper_variable_cell_length.step", "paper_variable_cell_length.stl
 report = lattice.report()
 low, high = lattice.bounding_box()
 size = " x ".join(f"{b - a:.2f}" for a, b in zip(low, high, strict=True))
-print(f"size {size} mm, wall {report.thinnest:.3f} to {report.thickest:.3f} mm")
+print(f"size {size} mm, wall {report.min_thickness:.3f} to {report.max_thickness:.3f} mm")
 print(f"{report.control_points} control points a side, {report.max_deviation:.1e} mm from the exact faces at most")
 print(f"volume {report.volume:.4f} mm3, exact {report.volume_exact:.4f} mm3")

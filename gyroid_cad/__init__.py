@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import Assembly, AssemblyReport
     from gyroid_cad.builds.meshes import mesh_quality
     from gyroid_cad.builds.triangles import TriangleReport
-    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SoundnessError
+    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SelfIntersectionError
     from gyroid_cad.fields.field import Field
     from gyroid_cad.fields.makers import (
         between_planes,
@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from gyroid_cad.nurbs.surface import NurbsSurface
     from gyroid_cad.printing.print_check import PrintCheck, print_check
     from gyroid_cad.printing.printers import Printer
-    from gyroid_cad.surface.fit import FitReport, FitSettings, fit_patch, fit_report
+    from gyroid_cad.surface.fit import FitSettings, fit_patch
+    from gyroid_cad.surface.fit_report import FitReport, fit_report
 
 __all__ = [
     "Assembly",
@@ -63,7 +64,7 @@ __all__ = [
     "ParameterError",
     "PrintCheck",
     "Printer",
-    "SoundnessError",
+    "SelfIntersectionError",
     "SpaceMap",
     "Sphere",
     "TriangleReport",
@@ -93,7 +94,7 @@ __all__ = [
 _HOMES = {
     "builds.assembly": ("Assembly", "AssemblyReport"),
     "maps.block": ("Bend", "Cylinder", "Sphere", "Twist"),
-    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"),
+    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"),
     "fields.field": ("Field",),
     "fields.makers": (
         "between_planes",
@@ -108,7 +109,8 @@ _HOMES = {
         "smooth_minimum",
     ),
     "filling.fill": ("FillReport", "Filled", "fill"),
-    "surface.fit": ("FitReport", "FitSettings", "fit_patch", "fit_report"),
+    "surface.fit": ("FitSettings", "fit_patch"),
+    "surface.fit_report": ("FitReport", "fit_report"),
     "lattice": ("Lattice", "LatticeReport"),
     "maps.space": ("SpaceMap",),
     "mesh.finite_elements.abaqus": ("write_periodic_equations",),

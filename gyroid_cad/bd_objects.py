@@ -96,7 +96,7 @@ class GyroidFill(Part):  # type: ignore[misc]
 
     Raises
     ------
-    ParameterError, SoundnessError, FitError, KernelError
+    ParameterError, SelfIntersectionError, FitError, KernelError
     """
 
     def __init__(

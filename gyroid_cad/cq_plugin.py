@@ -103,7 +103,7 @@ def gyroid_fill(
 
     Raises
     ------
-    ParameterError, SoundnessError, FitError, KernelError
+    ParameterError, SelfIntersectionError, FitError, KernelError
     """
     selected = [shape for shape in self.objects if isinstance(shape, cq.Face)]
     if selected:

@@ -1,8 +1,8 @@
-"""What can go wrong, in words a user can act on: the parameter, its value, what is accepted."""
+"""Errors, in words a user can act on: the parameter, its value, what is accepted."""
 
 from __future__ import annotations
 
-__all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SoundnessError"]
+__all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"]
 
 
 class GyroidError(Exception):
@@ -35,7 +35,7 @@ class ParameterError(GyroidError, ValueError):
         return type(self), (self.parameter, self.value, self.accepted)
 
 
-class SoundnessError(ParameterError):
+class SelfIntersectionError(ParameterError):
     """A field or a map that cannot be built somewhere in the lattice.
 
     Parameters
@@ -78,7 +78,7 @@ class SoundnessError(ParameterError):
         self.parameter, self.value, self.accepted, self.quantity = parameter, value, accepted, quantity
         self.place, self.limit, self.reason, self.unit = place, limit, reason, unit
 
-    def __reduce__(self) -> tuple[type[SoundnessError], tuple[object, ...]]:  # type: ignore[override]
+    def __reduce__(self) -> tuple[type[SelfIntersectionError], tuple[object, ...]]:  # type: ignore[override]
         given = (
             self.parameter,
             self.value,
@@ -107,5 +107,6 @@ class ExportError(GyroidError, OSError):
 def _shown(value: object) -> str:
     try:
         return repr(value)
-    except ValueError:  # a whole number of more digits than Python prints
+    # A whole number of more digits than Python prints, or lists within lists within lists.
+    except (ValueError, RecursionError):
         return f"a {type(value).__name__} too long to print"

@@ -3,48 +3,29 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Iterable
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
-
-from numpy.typing import ArrayLike
+from typing import TYPE_CHECKING
 
 from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
 from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
-from gyroid_cad.common.checks import finite_number, positive_number
+from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.fields.paper import paper_units
-from gyroid_cad.maps.block import as_map, space_over
-from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
 from gyroid_cad.mesh.iga.patches import VolumePatches
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
-from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
-from gyroid_cad.surface.fit import FitSettings, fit_within
-from gyroid_cad.wall.complex import build_complex
-from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import LaidWall, Recipe, laid_wall
-from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.limits import (
-    require_cell_size,
-    require_density,
-    require_one,
-    require_thickness,
-    sound_tolerance,
-    whole_cells,
-)
+from gyroid_cad.wall.fitted import FittedWall, fitted_wall
 from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.parameters import LatticeParameters, MapLike
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
@@ -52,21 +33,12 @@ if TYPE_CHECKING:
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
 
 Corner = tuple[float, float, float]
-MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
-# Of a lattice that varies, in cell sizes.
-USUAL_TOLERANCE = 1e-4
-BOX = "box"
 _LENGTH = "a length in mm, a finite number"
-_FIELDS = {
-    "thickness": "a length in mm",
-    "density": "a volume fraction",
-    "scale_field": "a factor without unit",
-}
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice:
+class Lattice(LatticeParameters):
     """A block of cells of the gyroid or another surface: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches
@@ -83,12 +55,12 @@ class Lattice:
     cell_size : float
         Period L of the cubic cell, in mm.
     thickness : number or field, optional
-        Whole wall along the normal of the finished mid-surface, in mm; less than 0.37647 L where cells are alike.
+        Whole wall along the normal of the finished mid-surface, in mm; less than 0.37647 L where it is uniform.
     density : number or field, optional
         Volume fraction instead of thickness, less than 0.94033. Where it or the space varies the tube
         formula is inverted place by place, and the wall stretched as the space across it is.
     fit : FitSettings
-        How the patch is fitted. Where the lattice varies, its control points are the fewest to try.
+        How the patch is fitted. Where the lattice is graded, its control points are the fewest to try.
     scale_field : number or field, optional
         Cells grow and shrink by it: a place p is moved to scale_field(p) p, the paper's variable BC length.
     map : SpaceMap, Cylinder, Sphere, Twist, Bend, str or callable, optional
@@ -96,7 +68,7 @@ class Lattice:
         function of x, y, z that returns three arrays.
     tolerance : float, optional
         Largest deviation of the fit in cell sizes: the number of control points rises until it is met. If left
-        out, 1e-4 where the lattice varies, and ``fit`` as it is where cells are alike.
+        out, 1e-4 where the lattice is graded, and ``fit`` as it is where it is uniform.
     trim : {"box"}, optional
         Cut to the block of cells itself, with flat sides, instead of whole patches. Not where space varies.
     surface : {"gyroid", "diamond", "primitive"}
@@ -108,116 +80,6 @@ class Lattice:
         Naming the parameter, its value and what is accepted.
     """
 
-    cells: tuple[int, int, int]
-    cell_size: float
-    thickness: FieldLike | None = None
-    density: FieldLike | None = None
-    fit: FitSettings = field(default_factory=FitSettings)
-    scale_field: FieldLike | None = None
-    map: MapLike | None = None
-    tolerance: float | None = None
-    trim: str | None = None
-    surface: str = USUAL.name
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", whole_cells(self.cells))
-        object.__setattr__(
-            self, "cell_size", finite_number("cell_size", self.cell_size, "a length in mm, a finite number")
-        )
-        require_cell_size(self.cell_size)
-        require_one(self.thickness, self.density)
-        for name, meaning in _FIELDS.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
-        if self.map is not None:
-            object.__setattr__(self, "map", as_map(self.map))
-        surface_named(self.surface)
-        self._require_fit()
-        self._require_trim()
-        if not self.uniform:
-            self._require_variable()
-        elif self.density is None:
-            require_thickness(self.wall_thickness, self.cell_size, self.minimal_surface.tube)
-        else:
-            require_density(self.volume_fraction, self.cell_size, self.minimal_surface.tube)
-
-    @classmethod
-    def paper(
-        cls,
-        cells: tuple[int, int, int],
-        thickness_factor: FieldLike,
-        bc_length: FieldLike = 1.0,
-        scale: float = 1.0,
-        fit: FitSettings | None = None,
-        tolerance: float | None = None,
-        surface: str = USUAL.name,
-    ) -> Self:
-        """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
-
-        Parameters
-        ----------
-        cells : tuple of int
-            Number of cubic cells along x, y, z; each is two bounding cells long.
-        thickness_factor : number or field
-            Whole wall in BC units, of places in BC units before they are moved.
-        bc_length : number or field
-            In BC units: a place p is moved to bc_length(p) p.
-        scale : float
-            Millimetres per unit of BC length.
-        fit, tolerance, surface
-            As of :class:`Lattice`.
-
-        Raises
-        ------
-        ParameterError
-        """
-        given = paper_units(thickness_factor, bc_length, scale)
-        return cls(
-            cells,
-            given.cell_size,
-            given.thickness,
-            fit=fit or FitSettings(),
-            scale_field=given.scale_field,
-            tolerance=tolerance,
-            surface=surface,
-        )
-
-    @property
-    def minimal_surface(self) -> MinimalSurface:
-        """The surface of that name, from the table of families."""
-        return surface_named(self.surface)
-
-    @property
-    def uniform(self) -> bool:
-        """Whether every cell is like every other."""
-        varying = isinstance(self.thickness, Field) or isinstance(self.density, Field)
-        return not varying and self.scale_field is None and self.map is None
-
-    @property
-    def wall_thickness(self) -> float:
-        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice varies."""
-        if not self.uniform:
-            return self._measures().mean_thickness
-        if self.density is None:
-            return float(self.thickness)  # type: ignore[arg-type]
-        return self.minimal_surface.tube.thickness(self.density) * self.cell_size  # type: ignore[arg-type]
-
-    @property
-    def volume_fraction(self) -> float:
-        """The density, whichever of thickness and density was given; the whole block's where the lattice varies."""
-        if not self.uniform:
-            return self.exact_volume / block_volume(self.cells, self._grading())
-        if self.density is None:
-            return self.minimal_surface.tube.density(self.wall_thickness / self.cell_size)
-        return float(self.density)  # type: ignore[arg-type]
-
-    @property
-    def exact_volume(self) -> float:
-        """Volume in mm3 of the exact lattice, by the tube formula, or by quadrature where it varies."""
-        if not self.uniform:
-            return self._measures().volume
-        return prod(self.cells) * self.volume_fraction * self.cell_size**3
-
     def wall(self) -> Wall:
         """Control nets of the wall's faces, in mm, and the cell complex they belong to.
 
@@ -226,11 +88,11 @@ class Lattice:
         FitError
             If the fit's edges do not meet those of its neighbours.
         """
-        return self.laid().wall
+        return self.fitted().wall
 
     def bounding_box(self) -> tuple[Corner, Corner]:
         """Lowest and highest corner of the box round the wall, in mm."""
-        low, high = (corner.tolist() for corner in self.laid().bounding_box())
+        low, high = (corner.tolist() for corner in self.fitted().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:
@@ -265,7 +127,7 @@ class Lattice:
         built = self.built(progress)
         built.valid(progress)
         with built.timed("fit report"):
-            # Of a wall that varies and is cut there is no exact volume to compare with.
+            # Of a graded wall that is cut there is no exact volume to compare with.
             exact = self.exact_volume if self.uniform or not self.trim else None
             measures = (self.wall_thickness, self.volume_fraction, exact)
         return report_of(built, *measures)
@@ -339,14 +201,14 @@ class Lattice:
         FitError, KernelError
             As of :meth:`solid`.
         """
-        return assembly(self._recipe(), progress)
+        return assembly(self.spec(), progress)
 
     def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
         """Make the assembly if it isn't yet, and say what it is; nothing is written."""
         return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
-        """Whether the solid must be built for files with these endings: not for triangles of whole patches."""
+        """Tell whether files with these endings need the solid: triangles of whole patches do not."""
         formats = {FORMATS[Path(path).suffix.lower()] for path in paths}
         return bool(self.trim) or not formats <= set(TRIANGLE_FORMATS)
 
@@ -375,8 +237,8 @@ class Lattice:
             deviation = finite_number("deviation", deviation, _LENGTH)
             require_meshing(deviation)
         # The wall first, so that its progress is told.
-        self.laid(progress)
-        return triangles(self._recipe(), self._deviation(deviation), progress)
+        self.fitted(progress)
+        return triangles(self.spec(), self._deviation(deviation), progress)
 
     def triangle_report(self, deviation: float | None = None, progress: Progress | None = None) -> TriangleReport:
         """Make the triangles if they aren't yet, and say what they are; nothing is written."""
@@ -409,11 +271,11 @@ class Lattice:
         ParameterError
             Also if memory would not do, or an element would be turned inside out.
         """
-        return hexahedral_mesh(self.laid(), subdivisions, layers, order, full)
+        return hexahedral_mesh(self.fitted(), subdivisions, layers, order, full)
 
     def quadrilaterals(self, subdivisions: int, order: int = 1, full: bool = False) -> Mesh:
         """The mid-surface as structured quadrilaterals, as of :meth:`hexahedra`; quadratic ones of 8 nodes, or of 9."""
-        return quadrilateral_mesh(self.laid(), subdivisions, order, full)
+        return quadrilateral_mesh(self.fitted(), subdivisions, order, full)
 
     def volumes(self, degree: int = 1) -> VolumePatches:
         """The wall as trivariate NURBS patches that share their control points, for isogeometric analysis.
@@ -432,7 +294,7 @@ class Lattice:
         ------
         ParameterError
         """
-        return lattice_volumes(self.laid(), degree)
+        return lattice_volumes(self.fitted(), degree)
 
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
@@ -452,14 +314,14 @@ class Lattice:
         ------
         ParameterError
             Also of more cells than a picture could show.
-        SoundnessError, FitError, KernelError
+        SelfIntersectionError, FitError, KernelError
         """
         size, camera = require_view(size, camera)
         if prod(self.cells) > self._most_drawn:
             raise ParameterError("cells", self.cells, f"at most {self._most_drawn} cells in all in a picture")
         if self.trim:
             return shape_picture(self.solid(), size, camera)
-        return wall_picture(self.laid().wall, size, camera)
+        return wall_picture(self.fitted().wall, size, camera)
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
         return mime_bundle(f"{self.surface} lattice", self._shown, self.picture)
@@ -469,7 +331,7 @@ class Lattice:
         return MOST_DRAWN_PATCHES // len(self.minimal_surface.cell)
 
     def _shown(self) -> list[tuple[str, str]]:
-        """What a notebook says of it, beside its picture."""
+        """Rows that a notebook shows beside the picture."""
         rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
         drawn = prod(self.cells) <= self._most_drawn
         # What varies over so many cells would take long to measure.
@@ -487,69 +349,12 @@ class Lattice:
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files."""
-        return build(self._recipe(), progress)
+        return build(self.spec(), progress)
 
-    def laid(self, progress: Progress | None = None) -> LaidWall:
+    def fitted(self, progress: Progress | None = None) -> FittedWall:
         """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""
-        return laid_wall(self._recipe(), progress)
+        return fitted_wall(self.spec(), progress)
 
     def _deviation(self, given: float | None) -> float:
-        """Of triangles, in mm; the usual one if none is given."""
-        return min(self.cell_size / 1000, self.laid().thinnest / 10) if given is None else given
-
-    def _recipe(self) -> Recipe:
-        settings = self.fit
-        if self.uniform and self.tolerance is not None:
-            settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
-        tolerance = self.tolerance or USUAL_TOLERANCE
-        return Recipe(self.cells, self._grading(), settings, tolerance, self.trim == BOX)
-
-    def _grading(self) -> Grading:
-        if self.uniform:
-            return Grading(self.cell_size, self.wall_thickness, surface=self.minimal_surface)
-        space = None if self.map is None else space_over(self.map, self.cells, self.cell_size)  # type: ignore[arg-type]
-        return Grading(
-            self.cell_size,
-            self.thickness,  # type: ignore[arg-type]
-            self.density,  # type: ignore[arg-type]
-            self.scale_field,  # type: ignore[arg-type]
-            space,
-            self.minimal_surface,
-        )
-
-    def _measures(self) -> ExactMeasures:
-        return _measures(self.cells, self._grading())
-
-    def _require_variable(self) -> None:
-        """What can be told of a lattice that varies before it is built."""
-        for name in ("thickness", "scale_field"):
-            if isinstance(value := getattr(self, name), float):
-                positive_number(name, value)
-        if isinstance(self.density, float):
-            require_density(self.density, self.cell_size, self.minimal_surface.tube)
-        if self.scale_field is not None and any(self._grading().map_closes):
-            raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
-
-    def _require_trim(self) -> None:
-        if self.trim not in (None, BOX):
-            raise ParameterError("trim", self.trim, f"{BOX}, or none for whole patches")
-        if self.trim and (self.scale_field is not None or self.map is not None):
-            raise ParameterError("trim", self.trim, "none where a map or a scale field carries the block elsewhere")
-
-    def _require_fit(self) -> None:
-        if not isinstance(self.fit, FitSettings):
-            raise ParameterError("fit", self.fit, "a FitSettings")
-        if not self.uniform and not self.fit.plain:
-            raise ParameterError(
-                "fit",
-                self.fit,
-                "evenly spaced knots, equal weights and the smooth parameterisation where the lattice varies: "
-                "there the number of control points rises with the tolerance",
-            )
-        if self.tolerance is not None:
-            object.__setattr__(self, "tolerance", sound_tolerance(self.tolerance))
-
-
-@lru_cache(maxsize=16)
-def _measures(cells: tuple[int, int, int], grading: Grading) -> ExactMeasures:
-    return exact_measures(build_complex(cells, grading.surface.cell, grading.closed), grading)
+        """Largest deviation of triangles, in mm; the usual one if none is given."""
+        return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given

@@ -24,7 +24,7 @@ from gyroid_cad.mesh.finite_elements.quality import (
     shown_name,
     shown_number,
 )
-from gyroid_cad.mesh.finite_elements.quality_picture import draw_quality
+from gyroid_cad.mesh.finite_elements.summaries import draw_quality
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def _quadrilaterals(points: Floats) -> Mesh:
 
 
 def _print_comparison(reports: dict[str, Quality]) -> None:
-    shown = ("scaled_jacobian", "edge_ratio", "skew", "smallest_angle", "largest_angle")
+    shown = ("scaled_jacobian", "edge_ratio", "skew", "min_angle", "max_angle")
     rows = []
     for name, report in reports.items():
         measures = [report.measures[measure] for measure in shown]

@@ -19,7 +19,8 @@ from scipy.special import ellipk
 import gyroid_cad
 from gyroid_cad.cli.app import main
 from gyroid_cad.surface.families import SURFACES
-from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.surface.weierstrass import CORNER
 
 ROOT = Path(__file__).parents[1]
@@ -161,7 +162,7 @@ def test_the_families_table_is_the_codes() -> None:
         "patches per cell": lambda surface: f"{len(surface.cell)}",
         "area per cell": lambda surface: f"{surface.tube.area:.7f} L²",
         "Euler characteristic per cell": lambda surface: f"{surface.tube.euler_characteristic:.0f}",
-        "wall below": lambda surface: f"{surface.tube.largest_thickness:.5f} L",
+        "wall below": lambda surface: f"{surface.tube.max_thickness:.5f} L",
     }
     page = (DOCS / "mathematics" / "families.md").read_text()
     for name, shown in rows.items():

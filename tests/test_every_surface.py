@@ -47,11 +47,11 @@ def test_volume_follows_the_tube_formula_from_thin_to_thick(name: str, part: flo
 
 @NAMES
 def test_a_wall_past_the_surface_s_own_limit_is_refused_with_it(name: str) -> None:
-    limit = SURFACES[name].tube.largest_thickness * SIZE
+    limit = SURFACES[name].tube.max_thickness * SIZE
     Lattice((1, 1, 1), SIZE, 0.9999 * limit, surface=name)
     with pytest.raises(ParameterError, match=f"below {limit:.5g} mm"):
         Lattice((1, 1, 1), SIZE, 1.0001 * limit, surface=name)
-    largest = SURFACES[name].tube.largest_density
+    largest = SURFACES[name].tube.max_density
     with pytest.raises(ParameterError, match=f"below {largest:.5f}"):
         Lattice((1, 1, 1), SIZE, density=largest + 1e-4, surface=name)
 
@@ -86,7 +86,7 @@ def test_walls_that_vary_and_mapped_space_are_as_near_as_asked(name: str) -> Non
 def test_a_ring_closes_on_itself(name: str) -> None:
     lattice = Lattice((6, 1, 1), SIZE, density=0.2, surface=name, map=Cylinder(12, angle=360), tolerance=1e-3)
     opened = Lattice((6, 1, 1), SIZE, density=0.2, surface=name, fit=FitSettings(6))
-    complex, open_complex = lattice.laid().complex, opened.laid().complex
+    complex, open_complex = lattice.fitted().complex, opened.fitted().complex
     assert complex.free.sum() < open_complex.free.sum()
     assert lattice.report().valid
 
@@ -103,11 +103,11 @@ def test_a_part_is_filled(name: str) -> None:
     filled = fill(cq.Workplane().sphere(5), SIZE, density=0.3, surface=name)
     assert filled.report.valid
     assert filled.report.closed
-    labyrinths = [
+    networks = [
         fill(cq.Workplane().box(10, 10, 10), SIZE, density=0.4, surface=name, kind=kind)
         for kind in ("network-a", "network-b")
     ]
-    for made in labyrinths:
+    for made in networks:
         assert made.report.density == pytest.approx(0.4, abs=1e-4)
 
 

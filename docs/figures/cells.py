@@ -12,10 +12,9 @@ from patches import STEPS, cell_sheets
 
 from gyroid_cad import Lattice
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import fit_patch
-from gyroid_cad.surface.symmetry import QUARTER
+from gyroid_cad.surface.symmetry import QUARTER, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import build_wall
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gyroid_cad.nurbs.surface import basis, gauss_points
-from gyroid_cad.surface.fit_settings import DEGREE, FitSettings
+from gyroid_cad.surface.fit import DEGREE, FitSettings
 from gyroid_cad.surface.weierstrass import CORNER
 
 _LINE, _SHADE, _DOT = "#2e2921", "#f0d9a8", "#a03020"

@@ -15,7 +15,7 @@ from gyroid_cad.common.formats import FORMATS
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.wall.fitted import Recipe
+from gyroid_cad.wall.fitted import LatticeSpec
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.assembly import NamedPart, Place
@@ -65,11 +65,11 @@ class Assembly:
         from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart
         from gyroid_cad.kernel.solid import faces_by_patch
 
-        solid, complex = self.cell.solid(), self.cell.laid.complex
+        solid, complex = self.cell.solid(), self.cell.fitted.complex
         bounding_cell = complex.placements.bounding_cell[complex.patch_placement].tolist()
         free = complex.free[complex.patch_edges]
         faces = []
-        for patch, some in enumerate(faces_by_patch(solid, self.cell.laid.wall)):
+        for patch, some in enumerate(faces_by_patch(solid, self.cell.fitted.wall)):
             group = bounding_cell[patch]
             colour = YELLOW if patch == 0 else RED if group == bounding_cell[0] else GREEN
             name = f"BC_{group + 1}_SFP_{bounding_cell[:patch].count(group) + 1}"
@@ -102,7 +102,7 @@ class Assembly:
 
 @dataclass(frozen=True, slots=True)
 class AssemblyReport:
-    """What an assembly is.
+    """Report on an assembly: its cells, faces, volume and file.
 
     Attributes
     ----------
@@ -140,12 +140,12 @@ class AssemblyReport:
         return asdict(self)
 
 
-def assembly(recipe: Recipe, progress: Progress | None = None) -> Assembly:
+def assembly(spec: LatticeSpec, progress: Progress | None = None) -> Assembly:
     """The assembly of a lattice of whole cells that are all alike.
 
     Parameters
     ----------
-    recipe : Recipe
+    spec : LatticeSpec
     progress : callable, optional
         Called with (stage, done, total).
 
@@ -156,12 +156,12 @@ def assembly(recipe: Recipe, progress: Progress | None = None) -> Assembly:
     FitError, KernelError
         As of the solid of one cell.
     """
-    if not recipe.grading.uniform or recipe.boxed:
+    if not spec.grading.uniform or spec.trimmed:
         raise ParameterError(
-            "instances", True, "a lattice whose cells are all alike and not trimmed: its one cell stands for all"
+            "instances", True, "a lattice whose cells are uniform and not trimmed: its one cell stands for all"
         )
-    one = build(replace(recipe, cells=(1, 1, 1)), progress)
-    return Assembly(recipe.cells, recipe.grading.cell_size, one)
+    one = build(replace(spec, cells=(1, 1, 1)), progress)
+    return Assembly(spec.cells, spec.grading.cell_size, one)
 
 
 def assembly_report(made: Assembly, thickness: float, density: float, volume_exact: float) -> AssemblyReport:

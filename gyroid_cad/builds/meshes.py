@@ -1,4 +1,4 @@
-"""From a lattice's wall to its meshes, checked: whole patches only, and no element turned inside out."""
+"""Meshes of a lattice's wall, checked: whole patches only, and no element turned inside out."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra, quadrilaterals
 from gyroid_cad.mesh.finite_elements.quality import Quality, inverted, quality_report
 from gyroid_cad.mesh.iga.patches import VolumePatches, wall_volumes
-from gyroid_cad.wall.fitted import LaidWall
+from gyroid_cad.wall.fitted import FittedWall
 
 __all__ = ["hexahedral_mesh", "lattice_volumes", "mesh_quality", "quadrilateral_mesh"]
 
 _QUADRILATERAL_CORNERS = 4
 
 
-def hexahedral_mesh(laid: LaidWall, subdivisions: int, layers: int, order: int, full: bool) -> Mesh:
+def hexahedral_mesh(fitted: FittedWall, subdivisions: int, layers: int, order: int, full: bool) -> Mesh:
     """Hexahedra of a lattice's wall; see :func:`gyroid_cad.mesh.finite_elements.hexahedra.hexahedra`.
 
     Raises
@@ -23,26 +23,26 @@ def hexahedral_mesh(laid: LaidWall, subdivisions: int, layers: int, order: int, 
     ParameterError
         If the lattice is trimmed, or an element would be turned inside out: then it says where.
     """
-    _require_whole_patches(laid)
-    mesh = hexahedra(laid.wall, subdivisions, layers, order, full)
+    _require_whole_patches(fitted)
+    mesh = hexahedra(fitted.wall, subdivisions, layers, order, full)
     # Of patches that are alike one is looked at.
-    patches = np.unique(laid.wall.patch_net, return_index=True)[1]
+    patches = np.unique(fitted.wall.patch_net, return_index=True)[1]
     nodes = mesh.cells.shape[1]
-    elements = mesh.cells.reshape(laid.complex.patch_count, -1, nodes)[patches].reshape(-1, nodes)
+    elements = mesh.cells.reshape(fitted.complex.patch_count, -1, nodes)[patches].reshape(-1, nodes)
     bad = inverted(mesh.points, elements)
     if len(bad.elements):
         worst = int(np.argmin(bad.determinants))
         where = ", ".join(f"{x:.4g}" for x in bad.places[worst])
         raise ParameterError(
             "thickness",
-            laid.thickest,
+            fitted.max_thickness,
             f"a thinner wall, or more than {subdivisions} subdivisions: near ({where}) mm an element of the mesh is "
             f"turned inside out, and {len(bad.elements) - 1} others of {len(elements)}",
         )
     return mesh
 
 
-def quadrilateral_mesh(laid: LaidWall, subdivisions: int, order: int, full: bool) -> Mesh:
+def quadrilateral_mesh(fitted: FittedWall, subdivisions: int, order: int, full: bool) -> Mesh:
     """Quadrilaterals of a lattice's mid-surface; see :func:`gyroid_cad.mesh.finite_elements.hexahedra.quadrilaterals`.
 
     Raises
@@ -50,11 +50,11 @@ def quadrilateral_mesh(laid: LaidWall, subdivisions: int, order: int, full: bool
     ParameterError
         If the lattice is trimmed.
     """
-    _require_whole_patches(laid)
-    return quadrilaterals(laid.wall, subdivisions, order, full)
+    _require_whole_patches(fitted)
+    return quadrilaterals(fitted.wall, subdivisions, order, full)
 
 
-def lattice_volumes(laid: LaidWall, degree: int) -> VolumePatches:
+def lattice_volumes(fitted: FittedWall, degree: int) -> VolumePatches:
     """A lattice's wall as trivariate patches; see :func:`gyroid_cad.mesh.iga.patches.wall_volumes`.
 
     Raises
@@ -62,12 +62,12 @@ def lattice_volumes(laid: LaidWall, degree: int) -> VolumePatches:
     ParameterError
         If the lattice is trimmed.
     """
-    _require_whole_patches(laid)
-    return wall_volumes(laid.wall, degree)
+    _require_whole_patches(fitted)
+    return wall_volumes(fitted.wall, degree)
 
 
 def mesh_quality(mesh: Mesh) -> Quality:
-    """What the elements of a mesh are worth; of quadrilaterals the corners are measured.
+    """Measure the quality of a mesh's elements; of quadrilaterals the corners are measured.
 
     Parameters
     ----------
@@ -80,6 +80,6 @@ def mesh_quality(mesh: Mesh) -> Quality:
     return quality_report(mesh.points, mesh.cells if mesh.layers else mesh.cells[:, :_QUADRILATERAL_CORNERS])
 
 
-def _require_whole_patches(laid: LaidWall) -> None:
-    if laid.recipe.boxed:
+def _require_whole_patches(fitted: FittedWall) -> None:
+    if fitted.spec.trimmed:
         raise ParameterError("trim", "box", "none with meshes and volumes, which are made of whole patches")

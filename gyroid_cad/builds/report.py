@@ -1,4 +1,4 @@
-"""What a lattice turned out to be, as plain values."""
+"""Report on a lattice's solid, as plain values."""
 
 from __future__ import annotations
 
@@ -6,40 +6,41 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gyroid_cad.builds.solid import Build
-from gyroid_cad.surface.fit import fit_patch, fit_report
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 
 __all__ = ["LatticeReport", "report_of"]
 
 
 @dataclass(frozen=True, slots=True)
 class LatticeReport:
-    """What was built, and how exactly.
+    """Report on a built lattice: its size, its faces, and how exact they are.
 
     Attributes
     ----------
     cells : tuple of int
     cell_size : float
         In mm, before any map.
-    thickness, thinnest, thickest : float
+    thickness, min_thickness, max_thickness : float
         Whole wall in mm: its mean over the mid-surface and its extremes.
     density : float
-        Volume fraction: of a cell, or of the mapped block where the lattice varies.
+        Volume fraction: of a cell, or of the mapped block where the lattice is graded.
     patches, faces, solids : int
     control_points : int
         Along each side of a patch.
     valid, closed : bool
         By the kernel's own check; every edge bounds exactly two faces.
-    free_edges : int
+    boundary_edges : int
         Mid-surface edges that bound one patch only: each carries a ruled side wall.
-    pinch_lines : int
+    non_manifold_edges : int
         Lines through the wall in which patches touch without joining.
     volume, volume_exact : float
         In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
-        where the lattice varies; the latter none of a lattice that varies and is cut.
+        where the lattice is graded; the latter none of a graded lattice that is cut.
     max_deviation : float
-        In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice varies.
+        In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice is graded.
     max_wall_error : float, optional
-        Relative, of the wall along the exact normal; where the lattice varies.
+        Relative, of the wall along the exact normal; where the lattice is graded.
     max_normal_angle : float
         In degrees, between fitted and exact normal of the mid-surface.
     samples_per_patch : dict
@@ -52,8 +53,8 @@ class LatticeReport:
     cells: tuple[int, int, int]
     cell_size: float
     thickness: float
-    thinnest: float
-    thickest: float
+    min_thickness: float
+    max_thickness: float
     density: float
     patches: int
     faces: int
@@ -61,8 +62,8 @@ class LatticeReport:
     control_points: int
     valid: bool
     closed: bool
-    free_edges: int
-    pinch_lines: int
+    boundary_edges: int
+    non_manifold_edges: int
     volume: float
     volume_exact: float | None
     max_deviation: float
@@ -87,31 +88,31 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
     volume_exact : float, optional
         Of the exact lattice, if it is known.
     """
-    laid = built.laid
-    refit, complex, recipe = laid.refit, laid.complex, laid.recipe
+    fitted = built.fitted
+    refit, complex, spec = fitted.refit, fitted.complex, fitted.spec
     with built.timed("fit report"):
-        fit = fit_report(fit_patch(recipe.settings, recipe.grading.surface.family))
-    cell_size = recipe.grading.cell_size
+        fit = fit_report(fit_patch(spec.settings, spec.grading.surface.family))
+    cell_size = spec.grading.cell_size
     return LatticeReport(
         cells=built.cells,
         cell_size=cell_size,
         thickness=thickness,
-        thinnest=refit.thinnest if refit else thickness,
-        thickest=refit.thickest if refit else thickness,
+        min_thickness=refit.min_thickness if refit else thickness,
+        max_thickness=refit.max_thickness if refit else thickness,
         density=density,
         patches=built.patches,
         faces=built.topology.faces,
         solids=built.topology.solids,
-        control_points=len(laid.wall.weights),
+        control_points=len(fitted.wall.weights),
         valid=built.valid(),
         closed=built.topology.closed,
-        free_edges=0 if recipe.boxed else int(complex.free.sum()),
-        pinch_lines=0 if recipe.boxed else complex.pinch_lines,
+        boundary_edges=0 if spec.trimmed else int(complex.free.sum()),
+        non_manifold_edges=0 if spec.trimmed else complex.non_manifold_edges,
         volume=built.volume,
         volume_exact=volume_exact,
         max_deviation=refit.max_deviation if refit else fit.max_distance * cell_size,
         max_wall_error=refit.max_wall_error if refit else None,
         max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,
-        samples_per_patch=laid.samples_per_patch,
+        samples_per_patch=fitted.samples_per_patch,
         seconds=dict(built.seconds),
     )

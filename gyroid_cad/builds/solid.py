@@ -1,4 +1,4 @@
-"""From numbers to a checked solid and its files, stage by stage, timed."""
+"""A checked solid and its files, made stage by stage, timed."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gyroid_cad.common.cache import Remembered
+from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.formats import FORMATS, require_meshing, require_schema
 from gyroid_cad.common.memory import require_memory
-from gyroid_cad.common.progress import Progress, tell, timed
+from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.box import Box, cut_to_box
-from gyroid_cad.wall.covering import PHASES
-from gyroid_cad.wall.fitted import LaidWall, Recipe, laid_wall
+from gyroid_cad.wall.covering import PERTURBATIONS
+from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
@@ -43,7 +43,7 @@ class Build:
 
     Attributes
     ----------
-    laid : LaidWall
+    fitted : FittedWall
         The wall it is made of.
     topology : Topology
     volume : float
@@ -55,23 +55,23 @@ class Build:
         By stage.
     """
 
-    def __init__(self, laid: LaidWall, progress: Progress | None) -> None:
-        self.laid = laid
-        self.seconds = dict(laid.seconds)
+    def __init__(self, fitted: FittedWall, progress: Progress | None) -> None:
+        self.fitted = fitted
+        self.seconds = dict(fitted.seconds)
         self._valid: bool | None = None
         self.shift = (0.0, 0.0, 0.0)
         self._require_memory(_SOLID_BYTES_PER_CELL)
         with self.timed("kernel", progress):
             from gyroid_cad.kernel.check import enclosed_volume, topology
-            from gyroid_cad.kernel.solid import realise
-        wall = laid.wall
-        if laid.recipe.boxed:
-            self._shape, self.volume, self.patches = self._boxed(progress)
+            from gyroid_cad.kernel.solid import build_solid
+        wall = fitted.wall
+        if fitted.spec.trimmed:
+            self._shape, self.volume, self.patches = self._trimmed(progress)
             expected, agreement = self._volume_in_box(), _BOXED_VOLUME_AGREEMENT
         else:
             with self.timed("solid", progress):
-                self._shape = realise(wall, lambda done, total: tell(progress, "solid", done, total))
-            self.volume, self.patches = enclosed_volume(self._shape), laid.complex.patch_count
+                self._shape = build_solid(wall, lambda done, total: report_progress(progress, "solid", done, total))
+            self.volume, self.patches = enclosed_volume(self._shape), fitted.complex.patch_count
             expected, agreement = wall.volume(), _VOLUME_AGREEMENT
         with self.timed("check", progress):
             self.topology = topology(self._shape)
@@ -79,24 +79,26 @@ class Build:
 
     @property
     def cells(self) -> tuple[int, int, int]:
-        return self.laid.recipe.cells
+        return self.fitted.spec.cells
 
-    def _boxed(self, progress: Progress | None) -> tuple[KernelShape, float, int]:
+    def _trimmed(self, progress: Progress | None) -> tuple[KernelShape, float, int]:
         """The shape cut to the block of cells, its volume, and how many patches are in it."""
         from gyroid_cad.kernel.split import compound_of
-        from gyroid_cad.kernel.trimmed import realise_boxed
+        from gyroid_cad.kernel.trimmed import build_trimmed
 
-        size = self.laid.recipe.grading.cell_size
+        size = self.fitted.spec.grading.cell_size
         box = Box(np.eye(3), np.zeros(3), np.array(self.cells) * size)
         problem: KernelError | None = None
-        for phase in PHASES:
+        for phase in PERTURBATIONS:
             shift = np.array(phase) * size
             try:
                 with self.timed("cut", progress):
                     # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
-                    left = cut_to_box(self.laid.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True)
+                    left = cut_to_box(
+                        self.fitted.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True
+                    )
                 with self.timed("solid", progress):
-                    solids = realise_boxed(left)
+                    solids = build_trimmed(left)
             except KernelError as failed:
                 problem = problem or failed
                 continue
@@ -106,11 +108,11 @@ class Build:
         raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
 
     def _volume_in_box(self) -> float | None:
-        """Of whole cells, all alike; none where they vary."""
-        if not self.laid.recipe.grading.uniform:
+        """Volume of the wall in whole uniform cells, in mm3; None where they vary."""
+        if not self.fitted.spec.grading.uniform:
             return None
-        cell = np.unique(self.laid.wall.patch_net, return_index=True)[1]
-        return prod(self.cells) * self.laid.wall.volume(cell)
+        cell = np.unique(self.fitted.wall.patch_net, return_index=True)[1]
+        return prod(self.cells) * self.fitted.wall.volume(cell)
 
     @contextmanager
     def timed(self, stage: str, progress: Progress | None = None) -> Iterator[None]:
@@ -125,7 +127,7 @@ class Build:
         return another_handle(self._shape)
 
     def valid(self, progress: Progress | None = None) -> bool:
-        """Whether the kernel's own check, asked once, finds the solid valid."""
+        """Verdict of the kernel's own check, asked once."""
         if self._valid is None:
             from gyroid_cad.kernel.check import is_valid
 
@@ -149,10 +151,10 @@ class Build:
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                write_shape(self._shape, path, schema, deviation, angle, cut=self.laid.recipe.boxed)
+                write_shape(self._shape, path, schema, deviation, angle, cut=self.fitted.spec.trimmed)
 
     def _require_memory(self, bytes_per_cell: int) -> None:
-        require_memory(self.cells, bytes_per_cell, len(self.laid.wall.weights))
+        require_memory(self.cells, bytes_per_cell, len(self.fitted.wall.weights))
 
     def _require_closed_and_full(self, expected: float | None, agreement: float) -> None:
         if not self.topology.closed:
@@ -190,15 +192,15 @@ def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, a
             write_3mf(*meshed(shape, path, deviation, angle), path)
 
 
-_builds: Remembered[Recipe, Build] = Remembered()
+_builds: Cache[LatticeSpec, Build] = Cache()
 
 
-def build(recipe: Recipe, progress: Progress | None = None) -> Build:
+def build(spec: LatticeSpec, progress: Progress | None = None) -> Build:
     """The build of a lattice; the last few are remembered.
 
     Parameters
     ----------
-    recipe : Recipe
+    spec : LatticeSpec
     progress : callable, optional
         Called with (stage, done, total).
 
@@ -213,10 +215,10 @@ def build(recipe: Recipe, progress: Progress | None = None) -> Build:
     """
 
     def made() -> Build:
-        require_memory(recipe.cells, _SOLID_BYTES_PER_CELL, recipe.settings.control_points)
-        return Build(laid_wall(recipe, progress), progress)
+        require_memory(spec.cells, _SOLID_BYTES_PER_CELL, spec.settings.control_points)
+        return Build(fitted_wall(spec, progress), progress)
 
-    return _builds.get(recipe, made)
+    return _builds.get(spec, made)
 
 
 def require_settings(

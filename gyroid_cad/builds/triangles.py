@@ -1,4 +1,4 @@
-"""From the wall of a lattice to files of triangles, stage by stage, timed: no kernel, no solid."""
+"""Triangles of a lattice's wall and their files, made stage by stage, timed: no kernel, no solid."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import ceil, prod
 from pathlib import Path
 from typing import Any
 
-from gyroid_cad.common.cache import Remembered
+from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.formats import FORMATS
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
@@ -16,7 +16,7 @@ from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import write_stl
 from gyroid_cad.mesh.triangles.three_mf import write_3mf
 from gyroid_cad.mesh.triangles.triangulation import triangulated
-from gyroid_cad.wall.fitted import LaidWall, Recipe, laid_wall
+from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
 __all__ = ["TriangleReport", "Triangles", "triangle_report", "triangles"]
 
@@ -29,18 +29,18 @@ class Triangles:
 
     Attributes
     ----------
-    laid : LaidWall
+    fitted : FittedWall
         The wall they are made of.
     triangulation : Triangulation
     seconds : dict
         By stage.
     """
 
-    def __init__(self, laid: LaidWall, deviation: float, progress: Progress | None) -> None:
-        self.laid = laid
-        self.seconds = dict(laid.seconds)
+    def __init__(self, fitted: FittedWall, deviation: float, progress: Progress | None) -> None:
+        self.fitted = fitted
+        self.seconds = dict(fitted.seconds)
         with timed(self.seconds, "triangles", progress):
-            self.triangulation = triangulated(laid.wall, deviation)
+            self.triangulation = triangulated(fitted.wall, deviation)
 
     def write(self, targets: Sequence[Path], progress: Progress | None = None) -> None:
         """Write the triangles to each target in the format of its ending.
@@ -52,7 +52,7 @@ class Triangles:
         ExportError
         """
         if any(FORMATS[path.suffix.lower()] == "3mf" for path in targets):
-            cells = self.laid.recipe.cells
+            cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count
             require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)), kernel=False)
         for path in targets:
@@ -67,32 +67,32 @@ class Triangles:
 
 @dataclass(frozen=True, slots=True)
 class TriangleReport:
-    """What the triangles of a lattice are worth.
+    """Report on the triangles of a lattice.
 
     Attributes
     ----------
     cells : tuple of int
     cell_size : float
         In mm, before any map.
-    thickness, thinnest, thickest : float
+    thickness, min_thickness, max_thickness : float
         Whole wall in mm: its mean over the mid-surface and its extremes.
     density : float
-        Volume fraction: of a cell, or of the mapped block where the lattice varies.
+        Volume fraction: of a cell, or of the mapped block where the lattice is graded.
     patches, triangles : int
     fewest_steps, most_steps : int
         Squares along a side of a patch, each two triangles.
     steps_through : int
         Of the free side walls, from face to face.
-    free_edges : int
+    boundary_edges : int
         Mid-surface edges that bound one patch only: each carries a ruled side wall.
-    pinch_lines : int
+    non_manifold_edges : int
         Lines through the wall in which patches touch without joining; there triangles are parted by a hair.
     volume, volume_wall, volume_exact : float
         In mm3: enclosed by the triangles, by the NURBS faces, and of the exact wall: by the tube formula, or by
-        quadrature where the lattice varies.
+        quadrature where the lattice is graded.
     deviation : float
         Largest distance between triangles and NURBS faces, in mm, as measured.
-    laid_off : float
+    volume_offset : float
         In mm, how far from the faces the corners of triangles lie at most, for the sake of the volume.
     seconds : dict
         By stage.
@@ -101,21 +101,21 @@ class TriangleReport:
     cells: tuple[int, int, int]
     cell_size: float
     thickness: float
-    thinnest: float
-    thickest: float
+    min_thickness: float
+    max_thickness: float
     density: float
     patches: int
     triangles: int
     fewest_steps: int
     most_steps: int
     steps_through: int
-    free_edges: int
-    pinch_lines: int
+    boundary_edges: int
+    non_manifold_edges: int
     volume: float
     volume_wall: float
     volume_exact: float
     deviation: float
-    laid_off: float
+    volume_offset: float
     seconds: dict[str, float]
 
     def as_dict(self) -> dict[str, Any]:
@@ -132,40 +132,40 @@ def triangle_report(made: Triangles, thickness: float, density: float, volume_ex
     thickness, density, volume_exact : float
         Of the exact lattice.
     """
-    laid, triangulation = made.laid, made.triangulation
-    complex, varies = laid.complex, laid.refit is not None
+    fitted, triangulation = made.fitted, made.triangulation
+    complex, varies = fitted.complex, fitted.refit is not None
     return TriangleReport(
-        cells=laid.recipe.cells,
-        cell_size=laid.recipe.grading.cell_size,
+        cells=fitted.spec.cells,
+        cell_size=fitted.spec.grading.cell_size,
         thickness=thickness,
-        thinnest=laid.thinnest if varies else thickness,
-        thickest=laid.thickest if varies else thickness,
+        min_thickness=fitted.min_thickness if varies else thickness,
+        max_thickness=fitted.max_thickness if varies else thickness,
         density=density,
         patches=complex.patch_count,
         triangles=triangulation.triangle_count,
         fewest_steps=int(triangulation.patch_steps.min()),
         most_steps=int(triangulation.patch_steps.max()),
         steps_through=triangulation.across,
-        free_edges=int(complex.free.sum()),
-        pinch_lines=complex.pinch_lines,
+        boundary_edges=int(complex.free.sum()),
+        non_manifold_edges=complex.non_manifold_edges,
         volume=triangulation.volume,
-        volume_wall=laid.wall.volume(),
+        volume_wall=fitted.wall.volume(),
         volume_exact=volume_exact,
         deviation=triangulation.deviation,
-        laid_off=triangulation.laid_off,
+        volume_offset=triangulation.volume_offset,
         seconds=dict(made.seconds),
     )
 
 
-_made: Remembered[tuple[Recipe, float], Triangles] = Remembered()
+_made: Cache[tuple[LatticeSpec, float], Triangles] = Cache()
 
 
-def triangles(recipe: Recipe, deviation: float, progress: Progress | None = None) -> Triangles:
+def triangles(spec: LatticeSpec, deviation: float, progress: Progress | None = None) -> Triangles:
     """The triangles of a lattice; the last few are remembered.
 
     Parameters
     ----------
-    recipe : Recipe
+    spec : LatticeSpec
         Of whole patches.
     deviation : float
         Largest distance of a triangle from the wall's faces and side walls, in mm.
@@ -179,4 +179,4 @@ def triangles(recipe: Recipe, deviation: float, progress: Progress | None = None
     FitError
         If the fit's edges do not meet those of its neighbours.
     """
-    return _made.get((recipe, deviation), lambda: Triangles(laid_wall(recipe, progress), deviation, progress))
+    return _made.get((spec, deviation), lambda: Triangles(fitted_wall(spec, progress), deviation, progress))

@@ -15,13 +15,13 @@ from gyroid_cad.cli.completion import answered_shell, completion_command
 from gyroid_cad.cli.console import print_built, print_check_table, print_table, shown_progress
 from gyroid_cad.cli.doctor import doctor_command, version_option
 from gyroid_cad.cli.fill import fill_command
-from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, option_name, printed_options
+from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, printed_options
 from gyroid_cad.cli.mesh import mesh_command, volumes_command
+from gyroid_cad.cli.messages import BAD_USAGE, Session, debug_option, failed
 from gyroid_cad.cli.print_check import print_check_command
 from gyroid_cad.cli.report import report_command
 from gyroid_cad.cli.view import view_command
 from gyroid_cad.common.files import file_sizes
-from gyroid_cad.errors import GyroidError, ParameterError
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 PROGRAM = "gyroid-cad"
-# Those that are no options.
-_ARGUMENTS = ("config", "file", "part")
-DONE, FAILED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+DONE = 0
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -148,13 +146,14 @@ for _command in (
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 def fit_report_command(control_points: int, as_json: bool) -> None:
-    """What our fit and the paper's are worth, side by side.
+    """Compare our fit of the patch with the paper's, side by side.
 
     \b
     gyroid-cad fit-report
     gyroid-cad fit-report --control-points 14 --json
     """
-    from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+    from gyroid_cad.surface.fit import FitSettings, fit_patch
+    from gyroid_cad.surface.fit_report import fit_report
 
     reports = {
         "smooth": asdict(fit_report(fit_patch(FitSettings(control_points)))),
@@ -176,6 +175,10 @@ def fit_report_command(control_points: int, as_json: bool) -> None:
     print_table(("L is the cell size", f"ours ({control_points} x {control_points})", "the paper's (10 x 10)"), rows)
 
 
+for _command in (commands, *commands.commands.values()):
+    debug_option(_command)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -191,50 +194,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if (answered := answered_shell(commands, PROGRAM)) is not None:
         return answered
+    session = Session()
     try:
         # Not commands.main: it would put an empty line before the one that says "interrupted".
-        with commands.make_context(PROGRAM, list(sys.argv[1:] if arguments is None else arguments)) as context:
+        with commands.make_context(
+            PROGRAM, list(sys.argv[1:] if arguments is None else arguments), obj=session
+        ) as context:
             commands.invoke(context)
-        status = DONE
+        return DONE
     except click.exceptions.Exit as left:
-        status = left.exit_code
+        return left.exit_code
     except click.exceptions.NoArgsIsHelpError as shown:
         click.echo(shown.format_message(), err=True)
-        status = BAD_USAGE
-    except click.ClickException as problem:
-        status = _fail(problem.format_message(), BAD_USAGE)
-    except ParameterError as problem:
-        status = _fail(_with_option_name(problem), BAD_USAGE)
-    except (click.Abort, KeyboardInterrupt):
-        status = _fail("interrupted", INTERRUPTED)
-    except Exception as problem:
-        if _was_interrupted(problem):
-            status = _fail("interrupted", INTERRUPTED)
-        elif isinstance(problem, GyroidError):
-            status = _fail(str(problem), FAILED)
-        else:  # a defect of ours is still one line for the user
-            status = _fail(f"unexpected {type(problem).__name__}: {problem}", FAILED)
-    return status
-
-
-def _fail(message: str, status: int) -> int:
-    click.echo(f"{PROGRAM}: error: {' '.join(message.split())}", err=True)
-    return status
-
-
-def _was_interrupted(problem: BaseException | None) -> bool:
-    """Whether an interrupt is behind an error: one that comes while the kernel is loaded ends as an ImportError."""
-    while problem is not None:
-        if isinstance(problem, KeyboardInterrupt):
-            return True
-        problem = problem.__cause__ or problem.__context__
-    return False
-
-
-def _with_option_name(problem: ParameterError) -> str:
-    if not problem.parameter.isidentifier() or problem.parameter in _ARGUMENTS:
-        return str(problem)
-    return str(problem).replace(problem.parameter, option_name(problem.parameter), 1)
+        return BAD_USAGE
+    except (Exception, KeyboardInterrupt) as problem:
+        return failed(problem, PROGRAM, session)
 
 
 def _summary(

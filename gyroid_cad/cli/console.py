@@ -1,4 +1,4 @@
-"""What the terminal shows: tables of what was built and how exactly, and how far the work has come."""
+"""Tables and progress on the terminal."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def print_summary(summary: dict[str, Any]) -> None:
         ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
         ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
         ("solids, faces", f"{summary['solids']}, {summary['faces']} (valid and closed)"),
-        ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
+        ("boundary edges, non-manifold edges", f"{summary['boundary_edges']}, {summary['non_manifold_edges']}"),
         ("volume", f"{summary['volume']:.8g} mm3{error}"),
         ("deviation", _deviation(summary)),
         *([("checked", _checks(summary["samples_per_patch"]))] if summary["samples_per_patch"] else []),
@@ -106,7 +106,7 @@ def print_triangles(summary: dict[str, Any]) -> None:
         ("cells", f"{nx} x {ny} x {nz}, {summary['cell_size']:g} mm each"),
         ("wall", f"{_range(summary)} mm, density {summary['density']:.5f}"),
         ("triangles", f"{summary['triangles']:,} (closed), {squares} squares a patch and face"),
-        ("free edges, pinch lines", f"{summary['free_edges']}, {summary['pinch_lines']}"),
+        ("boundary edges, non-manifold edges", f"{summary['boundary_edges']}, {summary['non_manifold_edges']}"),
         ("volume", f"{summary['volume']:.8g} mm3, {error:+.1e} of the exact one"),
         ("deviation", f"{summary['deviation']:.2g} mm from the NURBS faces"),
         *((file["path"], f"{file['bytes']:,} bytes") for file in summary["files"]),
@@ -126,7 +126,7 @@ def print_fill(summary: dict[str, Any]) -> None:
     islands = f"{summary['islands']} left, {summary['dropped']} dropped"
     rows = [
         ("kind", f"{summary['kind']}, cells of {summary['cell_size']:g} mm, wall {summary['thickness']:.6g} mm"),
-        *([] if summary["smallest_wall"] is None else [("smallest wall", f"{summary['smallest_wall']:.6g} mm")]),
+        *([] if summary["min_wall"] is None else [("smallest wall", f"{summary['min_wall']:.6g} mm")]),
         *([] if summary["skin"] is None else [("skin", f"{summary['skin']:g} mm")]),
         (
             "solids, faces",
@@ -199,8 +199,8 @@ def print_check_table(check: PrintCheck) -> None:
 def print_doctor(diagnosis: Diagnosis) -> None:
     """Print what is installed and what the self-test found."""
     rows = [(finding.subject, finding.state, finding.detail) for finding in diagnosis.findings]
-    verdict = "all that is required is there and works" if diagnosis.well else "something required fails"
-    print_table(None, [*rows, ("verdict", "well" if diagnosis.well else "failed", verdict)])
+    verdict = "all that is required is there and works" if diagnosis.ok else "something required fails"
+    print_table(None, [*rows, ("verdict", "ok" if diagnosis.ok else "failed", verdict)])
 
 
 def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
@@ -213,9 +213,9 @@ def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
 
 
 def _range(summary: dict[str, Any]) -> str:
-    if summary["thinnest"] == summary["thickest"]:
+    if summary["min_thickness"] == summary["max_thickness"]:
         return f"{summary['thickness']:.6g}"
-    return f"{summary['thinnest']:.4g} to {summary['thickest']:.4g}, on average {summary['thickness']:.4g}"
+    return f"{summary['min_thickness']:.4g} to {summary['max_thickness']:.4g}, on average {summary['thickness']:.4g}"
 
 
 def _deviation(summary: dict[str, Any]) -> str:

@@ -14,8 +14,8 @@ from gyroid_cad.version import __version__
 __all__ = ["doctor_command", "version_option"]
 
 
-def _print_version(context: click.Context, parameter: click.Parameter, asked: bool) -> None:
-    if asked:
+def _print_version(context: click.Context, parameter: click.Parameter, requested: bool) -> None:
+    if requested:
         from gyroid_cad.cli.installation import kernel_version
 
         click.echo(f"{context.info_name} {__version__}, {kernel_version()}")
@@ -54,5 +54,5 @@ def doctor_command(context: click.Context, as_json: bool) -> None:
         click.echo(json.dumps(diagnosis.as_dict()))
     else:
         print_doctor(diagnosis)
-    if not diagnosis.well:
+    if not diagnosis.ok:
         context.exit(1)

@@ -34,7 +34,7 @@ __all__ = ["fill_command"]
     help='Whole wall: a number, below 0.37647 of the cell size, or an expression such as "0.8 + 0.02*x".',
 )
 @click.option(
-    "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a labyrinth."
+    "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a network."
 )
 @click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
 @click.option(
@@ -50,7 +50,7 @@ __all__ = ["fill_command"]
     type=click.Choice(["sheet", "network-a", "network-b", "channels", "surface"]),
     default="sheet",
     show_default=True,
-    help="The wall, one of the two labyrinths it parts, both of them without the wall, or the mid-surface alone.",
+    help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone.",
 )
 @click.option("--origin", nargs=3, type=float, default=(0, 0, 0), metavar="X Y Z", help="Of the lattice, in mm.")
 @click.option("--rotation", nargs=3, type=float, default=(0, 0, 0), metavar="A B C", help="About x, y, z, in degrees.")

@@ -1,4 +1,4 @@
-"""What is installed, in which version, and whether it works: packages, kernel, programs, one cell built and read."""
+"""Diagnosis of an installation: packages and their versions, kernel, programs, one cell built and read."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ GOOD, MISSING, FAILED = "good", "missing", "failed"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was found of one thing.
+    """Finding about one package or program.
 
     Attributes
     ----------
@@ -81,13 +81,13 @@ class Diagnosis:
     findings: tuple[Finding, ...]
 
     @property
-    def well(self) -> bool:
-        """Whether nothing that is required is missing or fails."""
+    def ok(self) -> bool:
+        """Absence of anything required that is missing or fails."""
         return all(finding.state == GOOD for finding in self.findings if finding.required)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
-        return {"well": self.well, "findings": [asdict(finding) for finding in self.findings]}
+        return {"ok": self.ok, "findings": [asdict(finding) for finding in self.findings]}
 
 
 def kernel_version() -> str:
@@ -191,17 +191,17 @@ def _step_returns(folder: Path) -> str:
 
 def _stl_is_closed(folder: Path) -> str:
     from gyroid_cad.mesh.triangles.files import read_triangles
-    from gyroid_cad.mesh.triangles.shells import shells_of
+    from gyroid_cad.mesh.triangles.measures import triangle_measures
 
     lattice, path = _lattice(), folder / "cell.stl"
     lattice.write(path, deviation=_CELL_SIZE / 200)
-    shells = shells_of(*read_triangles(path))
-    error = float(shells.volumes.sum()) / lattice.exact_volume - 1
-    _require(shells.closed, f"{shells.open_edges} edges are open")
+    found = triangle_measures(*read_triangles(path))
+    error = found.volume / lattice.exact_volume - 1
+    _require(found.closed, f"{found.open_edges} edges are open")
     _require(abs(error) < _TRIANGLES_AGREEMENT, f"its volume is off by {error:.1e}")
-    return f"{int(shells.triangles.sum()):,} triangles, closed, volume off by {error:+.1e}"
+    return f"{found.triangles:,} triangles, closed, volume off by {error:+.1e}"
 
 
-def _require(holds: bool, problem: str) -> None:
-    if not holds:
+def _require(contains: bool, problem: str) -> None:
+    if not contains:
         raise RuntimeError(problem)

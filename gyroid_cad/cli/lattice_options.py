@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gyroid_cad.cli.messages import label, remember_config
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
+    from gyroid_cad.cli.config import Config
     from gyroid_cad.lattice import Lattice
 
 __all__ = [
@@ -17,7 +19,6 @@ __all__ = [
     "lattice_of",
     "lattice_options",
     "lattice_options_beside",
-    "option_name",
     "options_given",
     "printed_options",
     "surface_option",
@@ -27,27 +28,45 @@ _CONFIG_ENDING = ".toml"
 _OWN_OPTIONS = ("thickness", "density", "scale_field")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
-_NO_KEYS = {"config", "print_config", "as_json", "quiet", "help"}
+_NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
 # Of the files that "build" writes: other commands that take the same lattice pass over them.
 _BUILD_KEYS, _BUILD_FLAGS = ("output", "schema", "deviation", "angle", "instances"), ("instances",)
+# Keys that name files, which a command writes or reads: in the folder of the file that names them.
+_WRITTEN, _READ = ("output", "histogram", "screenshot"), ("printer",)
 
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
-    """What a file says takes the place of defaults, so that options on the command line override it."""
+    """Put a file's values in the place of defaults, so that options on the command line override them."""
     if path is not None and path.lower().endswith(_CONFIG_ENDING):
         from gyroid_cad.cli.config import read_config
 
-        named = {p.name: p for p in context.command.params if p.name and p.name not in _NO_KEYS}
-        flags = {name for name, option in named.items() if getattr(option, "is_flag", False)}
-        values = read_config(path, {*named, *_BUILD_KEYS}, {*flags, *_BUILD_FLAGS})
-        if isinstance(values.get("output"), str):
-            values["output"] = [values["output"]]
-        context.default_map = values
+        options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
+        flags = {name for name, option in options.items() if getattr(option, "is_flag", False)}
+        config = read_config(path, {*options, *_BUILD_KEYS}, {*flags, *_BUILD_FLAGS})
+        multiple = [name for name, option in options.items() if getattr(option, "multiple", False)]
+        remember_config(
+            context, config, {key: _default(context, config, key, key in multiple) for key in config.values}
+        )
     return path
 
 
+def _default(context: click.Context, config: Config, key: str, multiple: bool) -> Callable[[], Any]:
+    """Value that a file gives a key, taken only where the command line says nothing of it."""
+
+    def value() -> Any:
+        given = config.values[key]
+        parts = [given] if isinstance(given, str) else given
+        if key in _WRITTEN:
+            parts = [config.output(key, part, context.params["allow_outside"]) for part in parts]
+        elif key in _READ:
+            parts = [config.beside(part) if part.lower().endswith(_CONFIG_ENDING) else part for part in parts]
+        return parts if multiple or not isinstance(given, str) else parts[0]
+
+    return value
+
+
 def printed_options() -> str:
-    """What the command that runs was given, as TOML that it would read."""
+    """Options of the command that runs, as TOML that it would read."""
     from gyroid_cad.cli.config import printed_config
 
     context = click.get_current_context()
@@ -56,7 +75,7 @@ def printed_options() -> str:
 
 
 def _known_surfaces(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """What a shell may complete the name of a surface to."""
+    """Names that a shell may complete a surface to."""
     from gyroid_cad.surface.families import SURFACES
 
     return [name for name in SURFACES if name.startswith(incomplete)]
@@ -108,7 +127,7 @@ _OPTIONS = (
         "--tolerance",
         type=float,
         metavar="PART",
-        help="Largest deviation in cell sizes; 1e-4 if left out where the lattice varies.",
+        help="Largest deviation in cell sizes; 1e-4 if left out where the lattice is graded.",
     ),
     click.option(
         "--control-points",
@@ -134,11 +153,18 @@ def lattice_options(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The same, where the argument may be other files as well: those that this text shows."""
+    """Add a lattice's options where the argument may be other files as well: those that this text shows."""
 
     def given_to(function: Callable[..., None]) -> Callable[..., None]:
         for option in reversed(_OPTIONS):
             function = option(function)
+        outside = click.option(
+            "--allow-outside",
+            is_flag=True,
+            is_eager=True,
+            help="Let a TOML file name files to be written that are not in its own folder.",
+        )
+        function = outside(function)
         argument = click.argument(
             "config", required=False, metavar=f"[{files}]", is_eager=True, callback=_defaults_from_file
         )
@@ -151,7 +177,7 @@ def options_given(but: Collection[str]) -> list[str]:
     """Options that stand on the command line itself, as they are called there, but for those named."""
     context, line = click.get_current_context(), click.core.ParameterSource.COMMANDLINE
     named = [name for name in context.params if name not in but and context.get_parameter_source(name) == line]
-    return [option_name(name) for name in named]
+    return [label(context, name) for name in named]
 
 
 def chosen_surface(name: str | None) -> dict[str, Any]:
@@ -172,26 +198,35 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         raise click.UsageError(
             f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in {_CONFIG_ENDING}."
         )
-    if given["cells"] is None:
-        raise click.UsageError("Missing option '--cells'.")
     fit = _fit_settings(given["fit"], given["control_points"])
+    _require_given(given, "cells")
     surface = chosen_surface(given["surface"])
     if any(given[name] is not None for name in _PAPER_OPTIONS):
-        mixed = [name for name in (*_OWN_OPTIONS, "cell_size", "map", "trim") if given[name] is not None]
+        own = (*_OWN_OPTIONS, "cell_size", "map", "trim")
+        mixed = [name for name in own if given[name] is not None]
         if mixed or given["thickness_factor"] is None:
-            options = ", ".join(map(option_name, _PAPER_OPTIONS))
             raise click.UsageError(
-                f"{options} are the paper's units: they need --thickness-factor, and not "
-                + ", ".join(map(option_name, mixed or (*_OWN_OPTIONS, "cell_size", "map", "trim")))
+                f"{_listed(_PAPER_OPTIONS)} are the paper's units: they need {_listed(_PAPER_OPTIONS[:1])}, and not "
+                f"{_listed(mixed or own)}"
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
         return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], **surface)
-    if given["cell_size"] is None:
-        raise click.UsageError("Missing option '--cell-size'.")
+    _require_given(given, "cell_size")
     if (given["thickness"] is None) == (given["density"] is None):
-        raise click.UsageError("give exactly one of --thickness and --density")
-    own = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
-    return Lattice(given["cells"], given["cell_size"], **own, **surface, fit=fit)
+        raise click.UsageError(f"give exactly one of {_listed(_OWN_OPTIONS[:2], ' and ')}")
+    own_options = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
+    return Lattice(given["cells"], given["cell_size"], **own_options, **surface, fit=fit)
+
+
+def _require_given(given: dict[str, Any], name: str) -> None:
+    if given[name] is None:
+        nor = "" if given["config"] is None else f", and {given['config']} has no key {name}"
+        raise click.UsageError(f"Missing option '{_listed([name])}'{nor}.")
+
+
+def _listed(names: Collection[str], between: str = ", ") -> str:
+    context = click.get_current_context()
+    return between.join(label(context, name) for name in names)
 
 
 def _fit_settings(fit: str, control_points: int) -> Any:
@@ -203,8 +238,3 @@ def _fit_settings(fit: str, control_points: int) -> Any:
     if control_points != settings.control_points:
         raise ParameterError("control_points", control_points, "10, the paper's own, with --fit paper")
     return settings
-
-
-def option_name(parameter: str) -> str:
-    """How a parameter is called on the command line."""
-    return {"output": "-o", "part": "PART"}.get(parameter, "--" + parameter.replace("_", "-"))

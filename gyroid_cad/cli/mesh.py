@@ -74,12 +74,12 @@ def mesh_command(
         raise click.UsageError("Missing option '-o' / '--output'.")
     targets = require_distinct(output, lambda path: require_mesh_format(path, full))
     if histogram is not None:
-        from gyroid_cad.mesh.finite_elements.quality_picture import draw_quality, require_histogram
+        from gyroid_cad.mesh.finite_elements.summaries import draw_quality, require_histogram
 
         require_histogram(histogram)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         # The wall first, so that its progress is told.
-        lattice.laid(progress)
+        lattice.fitted(progress)
         with timed({}, "elements", progress):
             made = (
                 lattice.quadrilaterals(subdivisions, order, full)
@@ -149,7 +149,7 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
         raise click.UsageError("Missing option '-o' / '--output'.")
     targets = require_distinct(output, require_volume_file)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        lattice.laid(progress)
+        lattice.fitted(progress)
         with timed({}, "volumes", progress):
             made = lattice.volumes(degree)
         for target in targets:

@@ -101,7 +101,7 @@ def require_viewed(path: str | os.PathLike[str]) -> Path:
 
 
 def has_display() -> bool:
-    """Whether a window could be opened: elsewhere than on Linux there always is a desktop."""
+    """Tell whether a window could be opened: elsewhere than on Linux there always is a desktop."""
     if not sys.platform.startswith("linux"):
         return True
     try:
@@ -117,13 +117,13 @@ def has_display() -> bool:
 
 
 def can_draw_off_screen() -> bool:
-    """Whether VTK finds what it draws with, as tried in a process of its own: where it finds nothing it ends it."""
+    """Tell whether VTK finds what it draws with, in a process of its own: where it finds nothing it ends it."""
     return has_display() or _succeeds(_TRIAL)
 
 
 @lru_cache(maxsize=4)
 def _succeeds(program: str) -> bool:
-    """Whether a program runs to its end in a process of its own; it is tried once."""
+    """Tell whether a program runs to its end in a process of its own; it is tried once."""
     return subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode == 0
 
 

@@ -6,13 +6,13 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
-__all__ = ["Remembered"]
+__all__ = ["Cache"]
 
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 
 
-class Remembered(Generic[Key, Value]):
+class Cache(Generic[Key, Value]):
     """A store that forgets what was asked for longest ago; ``functools.lru_cache`` would take progress for a key.
 
     Parameters
@@ -29,7 +29,7 @@ class Remembered(Generic[Key, Value]):
         return len(self._held)
 
     def get(self, key: Key, make: Callable[[], Value]) -> Value:
-        """What is held for a key, or else what is made now."""
+        """Return the value held for a key, or else make it now."""
         if key not in self._held:
             made = make()
             while len(self._held) >= self._most:

@@ -1,4 +1,4 @@
-"""What a user gives: numbers that are real, finite and no boolean, functions that can be remembered."""
+"""Checks of a user's values: numbers that are real, finite and no boolean, functions that can be cached."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which files can be written, and with what settings: checked before anything is built, without the kernel."""
+"""Formats of files and their settings, checked before anything is built, without the kernel."""
 
 from __future__ import annotations
 

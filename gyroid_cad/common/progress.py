@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-__all__ = ["Progress", "Timed", "tell", "timed"]
+__all__ = ["Progress", "Timed", "report_progress", "timed"]
 
 Progress = Callable[[str, int, int], None]
 Timed = Callable[[str], AbstractContextManager[None]]
@@ -16,13 +16,13 @@ Timed = Callable[[str], AbstractContextManager[None]]
 def timed(seconds: dict[str, float], stage: str, progress: Progress | None) -> Iterator[None]:
     """Tell that a stage begins and ends, and add the seconds between to those of the stage."""
     start = time.perf_counter()
-    tell(progress, stage, 0, 1)
+    report_progress(progress, stage, 0, 1)
     yield
-    tell(progress, stage, 1, 1)
+    report_progress(progress, stage, 1, 1)
     seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
 
 
-def tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
+def report_progress(progress: Progress | None, stage: str, done: int, total: int) -> None:
     """Tell how far a stage has come, if anyone listens."""
     if progress is not None:
         progress(stage, done, total)

@@ -118,7 +118,7 @@ FieldLike = float | str | Field | Callable[..., ArrayLike]
 
 
 def as_field(parameter: str, value: object, meaning: str) -> float | Field:
-    """What a parameter was given as: a float wherever it does not vary, or else a Field.
+    """Turn a parameter's value into a float where it does not vary, or else a Field.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def as_field(parameter: str, value: object, meaning: str) -> float | Field:
 
 
 def given_as(parameter: str, value: float | Field | None) -> str:
-    """What a user knows a parameter's field as, for errors."""
+    """Name under which a user knows a parameter's field, for errors."""
     return value.parameter if isinstance(value, Field) and value.parameter else parameter
 
 

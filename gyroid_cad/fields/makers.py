@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import inf
 
 import numpy as np
@@ -13,12 +14,14 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, Floats, as_field, call_text, compiled_field, derived, shown
 
 __all__ = [
+    "PaperUnits",
     "between_planes",
     "constant",
     "distance_from_axis",
     "distance_from_point",
     "expression",
     "linear",
+    "paper_units",
     "radial",
     "sampled",
     "smooth_maximum",
@@ -29,7 +32,7 @@ Point = tuple[float, float, float]
 
 
 def constant(value: float) -> Field:
-    """The same value everywhere; raises ParameterError if it is not a finite number."""
+    """Field of one value everywhere; raises ParameterError if it is not a finite number."""
     number = finite_number("value", value)
     return Field(lambda x, y, z: number, call_text("constant", number), number)
 
@@ -208,7 +211,7 @@ def _offsets(start: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
 
 
 def _distance(start: Floats, unit: Floats | None = None) -> Callable[[Floats, Floats, Floats], Floats]:
-    """From a point, or from the line through it."""
+    """Distance from a point, or from the line through it."""
     across = np.eye(3) if unit is None else np.eye(3) - np.outer(unit, unit)
     return lambda x, y, z: np.linalg.norm(across @ _offsets(start, x, y, z), axis=0)
 
@@ -234,3 +237,79 @@ def _spline(grid: list[Floats], values: Floats, degree: int) -> Callable[[Floats
         coefficients = np.moveaxis(along.c, 0, number)
     spline: Callable[[Floats], Floats] = NdBSpline(tuple(knots), np.ascontiguousarray(coefficients), degree)
     return spline
+
+
+# A cubic cell is two bounding cells long.
+_CELL = 2
+
+
+@dataclass(frozen=True, slots=True)
+class PaperUnits:
+    """The paper's thickness factor and BC length, in millimetres.
+
+    Attributes
+    ----------
+    cell_size : float
+        In mm.
+    thickness : float or Field
+        In mm, of places in mm.
+    scale_field : Field, optional
+        Without unit, of places in mm.
+    """
+
+    cell_size: float
+    thickness: float | Field
+    scale_field: Field | None
+
+
+@dataclass(frozen=True, slots=True)
+class _InUnits:
+    """A field of places in BC units, as a function of places in mm; unlike a lambda it can be compared."""
+
+    field: Field
+    unit: float
+    factor: float
+
+    def __call__(self, x: Floats, y: Floats, z: Floats) -> ArrayLike:
+        return self.factor * np.asarray(self.field.function(x / self.unit, y / self.unit, z / self.unit))
+
+
+def paper_units(
+    thickness_factor: float | str | Field | Callable[..., ArrayLike],
+    bc_length: float | str | Field | Callable[..., ArrayLike],
+    scale: float,
+) -> PaperUnits:
+    """Translate the paper's description of a specimen.
+
+    Parameters
+    ----------
+    thickness_factor : float, str, Field or callable
+        Whole wall in BC units, of places in BC units before they are moved.
+    bc_length : float, str, Field or callable
+        Length of a bounding cell in BC units: a place p is moved to b(p) p.
+    scale : float
+        Millimetres per BC unit.
+
+    Returns
+    -------
+    PaperUnits
+
+    Raises
+    ------
+    ParameterError
+    """
+    scale = positive_number("scale", scale, "a finite number of mm per unit of BC length, above 0")
+    thickness = as_field("thickness_factor", thickness_factor, "the wall in BC units")
+    length = as_field("bc_length", bc_length, "a length in BC units")
+    if isinstance(length, float):
+        unit, scale_field = positive_number("bc_length", length, "a length in BC units above 0") * scale, None
+    else:
+        unit, scale_field = scale, _in_units("bc_length", length, scale, 1.0)
+    wall = thickness * scale if isinstance(thickness, float) else _in_units("thickness_factor", thickness, unit, scale)
+    return PaperUnits(_CELL * unit, wall, scale_field)
+
+
+def _in_units(parameter: str, field: Field, unit: float, factor: float) -> Field:
+    text = f"({field})(x/{unit:g}, y/{unit:g}, z/{unit:g})"
+    text = text if factor == 1 else f"{factor:g}*{text}"
+    return Field(_InUnits(field, unit, factor), text, parameter=parameter)

@@ -1,4 +1,4 @@
-"""Fill a part from CAD with gyroid: the wall, one of the two labyrinths, or the space that the wall leaves."""
+"""Fill a part from CAD with gyroid: the wall, one of the two networks, or the space that the wall leaves."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
@@ -20,18 +21,21 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
-from gyroid_cad.lattice import USUAL_TOLERANCE, Lattice
+from gyroid_cad.kernel.check import topology
+from gyroid_cad.kernel.part import Part, require_part
+from gyroid_cad.kernel.selection import selected_faces
+from gyroid_cad.kernel.skin import Hollow, hollow
+from gyroid_cad.kernel.solid import KernelShape, another_handle
+from gyroid_cad.kernel.split import compound_of
+from gyroid_cad.kernel.step import read_step
+from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.covering import Frame
-from gyroid_cad.wall.limits import require_cell_size, sound_tolerance
-
-if TYPE_CHECKING:
-    from gyroid_cad.kernel.part import Part
-    from gyroid_cad.kernel.skin import Hollow
-    from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 
 __all__ = ["FillReport", "Filled", "fill", "part_of"]
 
@@ -41,15 +45,15 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FillReport:
-    """What a filled part turned out to be.
+    """Report on a filled part.
 
     Attributes
     ----------
     kind : str
     cell_size, thickness : float
-        In mm; the wall where it is thickest, or for a labyrinth twice the distance of its border from the surface.
-    smallest_wall : float, optional
-        The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a labyrinth.
+        In mm; the wall where it is thickest, or for a network twice the distance of its border from the surface.
+    min_wall : float, optional
+        The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a network.
     skin : float, optional
         In mm.
     solids, faces : int
@@ -80,7 +84,7 @@ class FillReport:
     kind: str
     cell_size: float
     thickness: float
-    smallest_wall: float | None
+    min_wall: float | None
     skin: float | None
     solids: int
     faces: int
@@ -121,8 +125,6 @@ class Filled:
 
     def solid(self) -> KernelShape:
         """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own."""
-        from gyroid_cad.kernel.solid import another_handle
-        from gyroid_cad.kernel.split import compound_of
 
         shapes = list(self.domains.values())
         return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
@@ -204,9 +206,9 @@ def fill(
         Whole wall in mm; of the wall that is left, or that the channels leave. As of :class:`gyroid_cad.Lattice`,
         with x, y and z places in the part's space.
     density : number or field, optional
-        Volume fraction instead: of the wall, or of the labyrinth, for which it is one number.
+        Volume fraction instead: of the wall, or of the network, for which it is one number.
     kind : {"sheet", "network-a", "network-b", "channels", "surface"}
-        The wall; one of the two labyrinths it parts; both of them, the wall left out; or the mid-surface alone.
+        The wall; one of the two networks it parts; both of them, the wall left out; or the mid-surface alone.
     origin, rotation : tuple of float
         Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
     fit : FitSettings, optional
@@ -222,7 +224,7 @@ def fill(
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it.
     tolerance : float, optional
-        Largest deviation in cell sizes of a wall that varies; 1e-4 if left out.
+        Largest deviation in cell sizes of a graded wall; 1e-4 if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
         size, thickness, density and surface are its own.
@@ -246,7 +248,7 @@ def fill(
         raise ParameterError("openings", openings, "none without a skin")
     if shell is not None and kind == SURFACE:
         raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
-    closeness = USUAL_TOLERANCE if tolerance is None else sound_tolerance(tolerance)
+    closeness = USUAL_TOLERANCE if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     regions, size, infill_in = _described(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
@@ -289,16 +291,16 @@ def _described(
     def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
         made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
-        if smallest <= made.thickest:
-            raise ParameterError("thickness", made.thickest, f"less than the part's smallest extent, {smallest:.6g} mm")
+        if smallest <= made.max_thickness:
+            raise ParameterError(
+                "thickness", made.max_thickness, f"less than the part's smallest extent, {smallest:.6g} mm"
+            )
         return made
 
     return wanted.regions, size, endless
 
 
 def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
-    from gyroid_cad.kernel.selection import selected_faces
-    from gyroid_cad.kernel.skin import hollow
 
     return hollow(part, skin, selected_faces(part, openings))
 
@@ -306,8 +308,6 @@ def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
 def _reported(
     filling: Filling, outcome: Outcome, kind: str, skin: float | None, drop_islands: bool, grams: float | None
 ) -> Filled:
-    from gyroid_cad.kernel.check import topology
-    from gyroid_cad.kernel.split import compound_of
 
     domains = outcome.domains
     islands, dropped = sum(len(some) - 1 for some in domains.values()), 0
@@ -320,13 +320,13 @@ def _reported(
     }
     counted = topology(compound_of(shapes.values()))
     volume = sum(made.volume for some in domains.values() for made in some)
-    walls = [outcome.infill.thinnest] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
+    walls = [outcome.infill.min_thickness] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
     x, y, z = outcome.shift.tolist()
     report = FillReport(
         kind=kind,
         cell_size=filling.cell_size,
-        thickness=outcome.infill.thickest,
-        smallest_wall=min([*walls, *([] if skin is None else [skin])], default=None),
+        thickness=outcome.infill.max_thickness,
+        min_wall=min([*walls, *([] if skin is None else [skin])], default=None),
         skin=skin,
         solids=counted.solids,
         faces=counted.faces,
@@ -363,9 +363,6 @@ def part_of(given: Any) -> Part:
     ExportError
         If a file is no STEP file or holds no shape.
     """
-    from gyroid_cad.kernel.part import require_part
-    from gyroid_cad.kernel.split import compound_of
-    from gyroid_cad.kernel.step import read_step
 
     if isinstance(given, str | os.PathLike):
         return require_part(read_step(given))
@@ -379,6 +376,5 @@ def part_of(given: Any) -> Part:
 
 def _turn(degrees: Floats) -> Floats:
     """Turns about x, then y, then z."""
-    from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_euler("xyz", degrees, degrees=True).as_matrix())

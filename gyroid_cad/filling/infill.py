@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.progress import Timed
-from gyroid_cad.errors import SoundnessError
+from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field
 from gyroid_cad.filling.wanted import Region, Regions
+from gyroid_cad.kernel.solid import build_faces, build_patches
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
@@ -25,8 +26,8 @@ from gyroid_cad.wall.covering import (
     sides_of_points,
     wall_extremes,
 )
-from gyroid_cad.wall.exact import laid_patches, patch_points
-from gyroid_cad.wall.graded_fit import fit_wall
+from gyroid_cad.wall.exact import offset_patches, patch_points
+from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
@@ -52,7 +53,7 @@ class Infill:
     complex : CellComplex
     wall : Wall
         In the part's space.
-    thinnest, thickest : float
+    min_thickness, max_thickness : float
         Wall in mm.
     endless : bool
         Whether it goes on beyond its patches; else it ends at its free side walls.
@@ -62,55 +63,56 @@ class Infill:
     grading: Grading
     complex: CellComplex
     wall: Wall
-    thinnest: float
-    thickest: float
+    min_thickness: float
+    max_thickness: float
     endless: bool
 
-    def sides(self, distance: Any, holds: Any) -> Integers:
-        """Which patches lie inside a part, outside it, or may be crossed, as :func:`covering.patch_sides` tells."""
+    def sides(self, distance: Any, contains: Any) -> Integers:
+        """Side of a part on which each patch lies, or that it may be crossed, as :func:`covering.patch_sides` tells."""
         samples = np.linspace(-1, 1, SIDE_SAMPLES)
         if self.endless:
             own = patch_points(self.complex, self.grading.cell_size, samples)
         else:
-            laid = [some.points for _, some in laid_patches(self.complex, self.grading, samples)]
-            own = np.concatenate(laid).reshape(-1, SIDE_SAMPLES**2, 3)
+            fitted = [some.points for _, some in offset_patches(self.complex, self.grading, samples)]
+            own = np.concatenate(fitted).reshape(-1, SIDE_SAMPLES**2, 3)
         points = self.frame.placed(own)
-        return sides_of_points(self.complex, points, self.thickest / 2, distance, holds)
+        return sides_of_points(self.complex, points, self.max_thickness / 2, distance, contains)
 
     def offsets(self, points: Floats) -> Floats:
-        """How far points of the part's space lie from an endless mid-surface, in mm."""
+        """Signed distance of points of the part's space from an endless mid-surface, in mm."""
         return periodic_offsets(self.frame, self.grading.cell_size, points, self.grading.surface)
 
-    def holds(self, region: Region, points: Floats) -> Booleans:
-        """Which points of the part's space, shape (n, 3), lie in a region, to about 1e-3 cell sizes."""
+    def contains(self, region: Region, points: Floats) -> Booleans:
+        """Mask of the points of the part's space, shape (n, 3), that lie in a region, to about 1e-3 cell sizes."""
         if not self.endless:
             return self._block_holds(region, points)
         if self.grading.uniform:
-            return region.holds(self.offsets(points), np.full(len(points), self.thickest / 2))
+            return region.contains(self.offsets(points), np.full(len(points), self.max_thickness / 2))
         own = self.frame.own(points)
-        halves = self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2
-        return region.holds(self.offsets(points), halves)
+        half_thickness = self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2
+        return region.contains(self.offsets(points), half_thickness)
 
     def _block_holds(self, region: Region, points: Floats) -> Booleans:
-        laid = [laid for _, laid in laid_patches(self.complex, self.grading, np.linspace(-1, 1, _BLOCK_SAMPLES))]
+        fitted = [
+            fitted for _, fitted in offset_patches(self.complex, self.grading, np.linspace(-1, 1, _BLOCK_SAMPLES))
+        ]
         places, normals, thickness = (
-            np.concatenate([getattr(some, name) for some in laid]) for name in ("points", "normals", "thickness")
+            np.concatenate([getattr(some, name) for some in fitted]) for name in ("points", "normals", "thickness")
         )
         own = self.frame.own(points)
         offsets, nearest = nearest_offsets(places, normals, own)
-        # Beyond the block's free edges the nearest sample is far to the side.
+        # Beyond the block's boundary edges the nearest sample is far to the side.
         grid = places.reshape(-1, _BLOCK_SAMPLES, _BLOCK_SAMPLES, 3)
         gap = sum(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)) / 2
         aside = np.linalg.norm(own - places[nearest] - offsets[:, np.newaxis] * normals[nearest], axis=1)
-        return np.asarray(region.holds(offsets, thickness[nearest] / 2) & (aside <= gap))
+        return np.asarray(region.contains(offsets, thickness[nearest] / 2) & (aside <= gap))
 
     def faces(self, region: Region) -> list[list[Any]]:
         """The faces of every patch that bound a region, oriented out of it; neighbours share their edges."""
-        from gyroid_cad.kernel.solid import realise_faces, realise_patches
 
         if not self.endless:
-            return realise_patches(self.wall)
-        pairs = realise_faces(self.wall)
+            return build_patches(self.wall)
+        pairs = build_faces(self.wall)
         return [
             [pair[side].Reversed() if backwards else pair[side] for side, backwards in region.sides] for pair in pairs
         ]
@@ -139,27 +141,27 @@ def endless_infill(
     regions : Regions
     fit : FitSettings
     tolerance : float
-        Of a wall that varies, in cell sizes.
+        Of a graded wall, in cell sizes.
     timed : callable
         A context for each stage, by its name.
     surface : MinimalSurface
 
     Raises
     ------
-    ParameterError, SoundnessError, FitError
+    ParameterError, SelfIntersectionError, FitError
     """
     thickness, density = (_in_frame(value, frame) for value in (regions.thickness, regions.density))
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
-            thinnest, thickest = wall_extremes(low, high, frame, grading)
-            complex = covering_complex(low, high, frame, cell_size, thickest / 2, surface)
+            min_thickness, max_thickness = wall_extremes(low, high, frame, grading)
+            complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface)
         wall, refit = fit_wall(complex, grading, fit, tolerance, timed)
-    except SoundnessError as error:
+    except SelfIntersectionError as error:
         raise _moved(error, frame) from None
     if refit is not None:
-        thinnest, thickest = min(thinnest, refit.thinnest), max(thickest, refit.thickest)
-    return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), thinnest, thickest, True)
+        min_thickness, max_thickness = min(min_thickness, refit.min_thickness), max(max_thickness, refit.max_thickness)
+    return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
 
 
 def block_infill(lattice: Lattice, frame: Frame) -> Infill:
@@ -171,9 +173,9 @@ def block_infill(lattice: Lattice, frame: Frame) -> Infill:
     frame : Frame
         Where the lattice's own origin stands.
     """
-    laid = lattice.laid()
-    wall = laid.wall.moved(frame.rotation, frame.origin)
-    return Infill(frame, laid.recipe.grading, laid.complex, wall, laid.thinnest, laid.thickest, False)
+    fitted = lattice.fitted()
+    wall = fitted.wall.moved(frame.rotation, frame.origin)
+    return Infill(frame, fitted.spec.grading, fitted.complex, wall, fitted.min_thickness, fitted.max_thickness, False)
 
 
 def _in_frame(value: float | Field | None, frame: Frame) -> float | Field | None:
@@ -188,8 +190,8 @@ def _in_frame(value: float | Field | None, frame: Frame) -> float | Field | None
     return replace(value, function=carried)
 
 
-def _moved(error: SoundnessError, frame: Frame) -> SoundnessError:
-    """The same, with its place in the part's space."""
+def _moved(error: SelfIntersectionError, frame: Frame) -> SelfIntersectionError:
+    """Move an infill to its place in the part's space."""
     x, y, z = frame.placed(np.array(error.place)).tolist()
     kind, given = error.__reduce__()
     parameter, value, _, *rest = given

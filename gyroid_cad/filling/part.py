@@ -1,26 +1,29 @@
-"""From a part and a lattice to the checked solids of what is left, shifting the lattice where the kernel fails."""
+"""Checked solids that a lattice leaves in a part; the lattice is shifted a little where the kernel fails."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from gyroid_cad.common.progress import Progress, tell, timed
+from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
-from gyroid_cad.trim.box import BoxedWall, cut_to_box
-from gyroid_cad.wall.covering import CROSSING, INSIDE, PHASES, Frame
-
-if TYPE_CHECKING:
-    from gyroid_cad.kernel.part import Part
-    from gyroid_cad.kernel.skin import Hollow
-    from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.part import Part, measure
+from gyroid_cad.kernel.regions import split_by_region
+from gyroid_cad.kernel.skin import Hollow
+from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
+from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
+from gyroid_cad.trim.box import TrimmedWall, cut_to_box
+from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
 
 __all__ = ["Filling", "Made", "Outcome"]
 
@@ -46,7 +49,7 @@ class Made:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What filling gave.
+    """Solids that filling gave, and how they came about.
 
     Attributes
     ----------
@@ -71,7 +74,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filling:
-    """What stays the same however the lattice is shifted.
+    """A part to be filled: all that stays the same however the lattice is shifted.
 
     Attributes
     ----------
@@ -98,7 +101,7 @@ class Filling:
 
     @property
     def core(self) -> Part:
-        """What is filled: the part, or what its skin leaves of it."""
+        """The part that is filled: the whole one, or what its skin leaves of it."""
         return self.part if self.hollow is None else self.hollow.core
 
     def run(self, frame: Frame) -> Outcome:
@@ -110,15 +113,15 @@ class Filling:
         """
         points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
         with self.timed("cover"):
-            points = points[self.core.holds(points)]
+            points = points[self.core.contains(points)]
         problem: KernelError | None = None
         # Booleans the last time in one process: should it be the joining of regions that fails.
         attempts: list[tuple[Point, bool, int | None]] = [
-            (phase, False, processes) for phase, processes in zip(PHASES, (None, None, 1), strict=True)
+            (phase, False, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
         if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
             # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
-            attempts = [(phase, True, None) for phase in PHASES] + attempts
+            attempts = [(phase, True, None) for phase in PERTURBATIONS] + attempts
         for phase, by_sections, processes in attempts:
             shift = np.array(phase) * self.cell_size
             try:
@@ -141,12 +144,11 @@ class Filling:
             domains = {name: sorted(some, key=_size, reverse=True) for name, some in made.items() if some}
             if not domains:
                 raise KernelError("nothing of the lattice lies in the part")
-            self._require_sound(piece.shape for some in domains.values() for piece in some)
+            self._require_simple(piece.shape for some in domains.values() for piece in some)
         return Outcome(domains, infill, shift, cut, whole, by_sections)
 
     def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
-        """Of a box, whose sides are planes: cut without the kernel."""
-        from gyroid_cad.kernel.trimmed import realise_boxed
+        """Fill a box, whose sides are planes, without the kernel's booleans."""
 
         box = self.core.box
         assert box is not None
@@ -157,10 +159,10 @@ class Filling:
             skinned = self.hollow is not None and not region.fluid
             sides = [(side, backwards != skinned) for side, backwards in region.sides]
             with self.timed("cut"):
-                filled = not region.surface and bool(infill.holds(region, corner)[0]) != skinned
+                filled = not region.surface and bool(infill.contains(region, corner)[0]) != skinned
                 left = cut_to_box(infill.wall, box, sides, self.cell_size, filled, capped=not region.surface)
             with self.timed("solid"):
-                shapes = realise_boxed(left)
+                shapes = build_trimmed(left)
             pieces = [
                 Made(shape, 0.0 if region.surface else float(volume), float(area))
                 for shape, volume, area in zip(shapes, left.volumes, left.areas, strict=True)
@@ -172,20 +174,15 @@ class Filling:
 
     def _less(self, voids: list[Made]) -> Made:
         """The part less voids within it."""
-        from gyroid_cad.kernel.part import measure
-        from gyroid_cad.kernel.trimmed import hollowed_by
 
         volume, area = measure(self.part.shape)
         shape = hollowed_by(self.part.shape, (void.shape for void in voids))
         return Made(shape, volume - sum(void.volume for void in voids), area + sum(void.area for void in voids))
 
     def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
-        from gyroid_cad.kernel.part import measure
-        from gyroid_cad.kernel.regions import split_by_region
-        from gyroid_cad.kernel.split import bounded_solids, shells_of
 
         with self.timed("cover"):
-            sides = infill.sides(self._distance_from_boundary(), self.core.holds)
+            sides = infill.sides(self._distance_from_boundary(), self.core.contains)
         made = {}
         for region in self.regions:
             with self.timed("faces"):
@@ -196,15 +193,15 @@ class Filling:
             )
             with self.timed("split"):
                 pieces = split_by_region(
-                    self.core, cut, processes, lambda done, count: tell(self.progress, "split", done, count)
+                    self.core, cut, processes, lambda done, count: report_progress(self.progress, "split", done, count)
                 )
 
             def wanted_at(point: Floats, region: Region = region) -> bool:
-                return bool(infill.holds(region, point[np.newaxis])[0])
+                return bool(infill.contains(region, point[np.newaxis])[0])
 
             with self.timed("join"):
                 if region.surface:
-                    shapes: list[Any] = shells_of([*pieces.inside, *whole])
+                    shapes: list[Any] = connected_shells([*pieces.inside, *whole])
                 elif self.hollow is None or region.fluid:
                     shapes = list(bounded_solids(pieces, whole, wanted_at))
                 else:
@@ -217,7 +214,6 @@ class Filling:
         return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
 
     def _distance_from_boundary(self) -> Callable[[Floats], Floats]:
-        from scipy.spatial import cKDTree
 
         samples, error = self.core.surface_samples(_BOUNDARY_SPACING * self.cell_size)
         tree = cKDTree(samples)
@@ -230,7 +226,7 @@ class Filling:
             layer = 2 * _SURFACE_LAYER * self.cell_size
             hits = int(np.sum(np.abs(infill.offsets(points)) < layer / 2))
         else:
-            hits = int(np.sum(infill.holds(region, points)))
+            hits = int(np.sum(infill.contains(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
         skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
         size = sum(_size(piece) for piece in made) - skin
@@ -241,9 +237,7 @@ class Filling:
                 f"the kernel's {region.name} has {size:.6g} {unit}, where about {expected:.4g} {unit} are expected"
             )
 
-    def _require_sound(self, shapes: Iterable[KernelShape]) -> None:
-        from gyroid_cad.kernel.check import is_valid, topology
-        from gyroid_cad.kernel.split import compound_of
+    def _require_simple(self, shapes: Iterable[KernelShape]) -> None:
 
         everything = compound_of(shapes)
         counted, valid = topology(everything), is_valid(everything)
@@ -258,7 +252,11 @@ def _size(made: Made) -> float:
     return made.volume or made.area
 
 
-def _patches_of(left: BoxedWall) -> tuple[int, int]:
-    """How many patches a box cuts, and how many it leaves whole."""
-    cut = {face.patch for face in left.faces if any(rim < 0 for rims in face.rims for rim in rims)}
+def _patches_of(left: TrimmedWall) -> tuple[int, int]:
+    """Count the patches that a box cuts, and those that it leaves whole."""
+    cut = {
+        face.patch
+        for face in left.faces
+        if any(patch_edge < 0 for patch_edges in face.patch_edges for patch_edge in patch_edges)
+    }
     return len(cut), len({face.patch for face in left.faces} - cut)

@@ -1,4 +1,4 @@
-"""What a part may be filled with: regions of space between offsets of the mid-surface."""
+"""Regions of space between offsets of the mid-surface, with which a part may be filled."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
-from gyroid_cad.surface.tube import TubeLaw
+from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.limits import require_density, require_one, require_thickness
 
 __all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
@@ -42,15 +42,15 @@ class Region:
     surface: bool = False
     fluid: bool = False
 
-    def holds(self, offsets: Floats, halves: Floats) -> Booleans:
-        """Which offsets, in mm, lie between, where the half wall is so many mm."""
-        low = -np.inf if self.lowest is None else self.lowest * halves
-        high = np.inf if self.highest is None else self.highest * halves
+    def contains(self, offsets: Floats, half_thickness: Floats) -> Booleans:
+        """Mask of the offsets, in mm, that lie in the region where the wall's half thickness is so many mm."""
+        low = -np.inf if self.lowest is None else self.lowest * half_thickness
+        high = np.inf if self.highest is None else self.highest * half_thickness
         return np.asarray((offsets > low) & (offsets < high))
 
     @property
     def sides(self) -> list[tuple[int, bool]]:
-        """Which of the wall's faces, 0 or 1, bound it, and whether against the common normal."""
+        """The wall's faces, 0 or 1, that bound the region, each with whether it runs against the common normal."""
         if self.surface:
             return [(1, False)]
         below = [] if self.lowest is None else [(int(self.lowest >= 0), True)]
@@ -131,8 +131,8 @@ def _wall(
 
 
 def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
-    low, high = (1 - tube.largest_density) / 2, (1 + tube.largest_density) / 2
-    accepted = f"the labyrinth's volume fraction, one number above {low:.5f} and below {high:.5f}"
+    low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
+    accepted = f"the network's volume fraction, one number above {low:.5f} and below {high:.5f}"
     fraction = finite_number("density", density, accepted)
     if not low < fraction < high:
         raise ParameterError("density", density, accepted)

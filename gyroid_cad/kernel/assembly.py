@@ -54,7 +54,7 @@ class NamedFace:
 
 @dataclass(frozen=True, slots=True)
 class NamedPart:
-    """What an assembly has many of.
+    """A part that an assembly has many of.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the kernel really holds: closed or not, valid or not, and how much it encloses."""
+"""Checks of the kernel's shapes: closed, valid, and the volume they enclose."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from OCP.TopAbs import (
 )
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.surface import NurbsSurface, grid_derivatives
 
@@ -58,12 +58,12 @@ class Topology:
 
 def topology(shape: TopoDS_Shape) -> Topology:
     """Count solids, faces and edges that are not shared by exactly two faces."""
-    edges = TopTools_IndexedMapOfShape()
+    edges = NumberedShapes()
     uses: dict[tuple[int, TopAbs_Orientation], int] = {}
     # The explorer visits an edge once for each face it bounds, oriented as that face uses it.
     for edge in parts_of(shape, TopAbs_EDGE):
         # An edge shrunk to a point, as at the pole of a sphere, bounds one face only.
-        if BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
+        if BRep_Tool.Degenerated_s(as_edge(edge)):
             continue
         use = (edges.Add(edge), edge.Orientation())
         uses[use] = uses.get(use, 0) + 1
@@ -100,7 +100,7 @@ def enclosed_volume(shape: TopoDS_Shape) -> float:
     surfaces: dict[int, Geom_BSplineSurface] = {}
     uses = []
     for part in parts_of(shape, TopAbs_FACE):
-        face = TopoDS.Face_s(part)
+        face = as_face(part)
         location = TopLoc_Location()
         surface = BRep_Tool.Surface_s(face, location)
         if not isinstance(surface, Geom_BSplineSurface):

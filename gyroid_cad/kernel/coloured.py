@@ -1,4 +1,4 @@
-"""What is in a STEP file, with the colours it is to be shown in, through the kernel's document (XCAF)."""
+"""Shapes of a STEP file with the colours they are to be shown in, through the kernel's document (XCAF)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from OCP.BRep import BRep_Builder
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
-from OCP.TDF import TDF_Label, TDF_LabelSequence
+from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedMapOfShape
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_ColorTool, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.assembly import new_document
+from gyroid_cad.kernel.compat import LabelSequence, NumberedShapes
 from gyroid_cad.kernel.step import no_messages
 
 __all__ = ["Colour", "coloured_shapes"]
@@ -50,7 +50,7 @@ def coloured_shapes(path: str | os.PathLike[str]) -> list[Coloured]:
     with no_messages():
         if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
             raise ExportError(f"{path} could not be read as STEP")
-    free = TDF_LabelSequence()
+    free = LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
     found = _Parts(document)
     shapes = [one for label in _labels(free) for one in found.placed(label, TopLoc_Location(), None)]
@@ -67,14 +67,14 @@ class _Parts:
         self._parts: dict[int, list[Coloured]] = {}
 
     def placed(self, label: TDF_Label, location: TopLoc_Location, over: Colour) -> Iterator[Coloured]:
-        """What a label holds, moved; a colour of the occurrence goes before that of the part."""
+        """Shapes of a label, moved; a colour of the occurrence goes before that of the part."""
         if XCAFDoc_ShapeTool.IsReference_s(label):
             part = TDF_Label()
             XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
             own = XCAFDoc_ShapeTool.GetLocation_s(label)
             yield from self.placed(part, location.Multiplied(own), over or self._colour(label))
         elif XCAFDoc_ShapeTool.IsAssembly_s(label):
-            components = TDF_LabelSequence()
+            components = LabelSequence()
             XCAFDoc_ShapeTool.GetComponents_s(label, components)
             for component in _labels(components):
                 yield from self.placed(component, location, over)
@@ -93,7 +93,7 @@ class _Parts:
         return self._parts[key]
 
     def _coloured_faces(self, label: TDF_Label) -> list[Coloured]:
-        subshapes = TDF_LabelSequence()
+        subshapes = LabelSequence()
         XCAFDoc_ShapeTool.GetSubShapes_s(label, subshapes)
         every = [(XCAFDoc_ShapeTool.GetShape_s(one), self._colour(one)) for one in _labels(subshapes)]
         return [(shape, colour) for shape, colour in every if colour and shape.ShapeType() == TopAbs_FACE]
@@ -110,7 +110,7 @@ class _Parts:
 
 def _by_colour(shape: TopoDS_Shape, whole: Colour, coloured: list[Coloured]) -> list[Coloured]:
     """The faces of a shape, those of one colour together."""
-    faces = TopTools_IndexedMapOfShape()
+    faces = NumberedShapes()
     TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
     colours = dict.fromkeys(range(1, faces.Extent() + 1), whole)
     colours |= {faces.FindIndex(face): colour for face, colour in coloured if faces.Contains(face)}
@@ -124,5 +124,5 @@ def _by_colour(shape: TopoDS_Shape, whole: Colour, coloured: list[Coloured]) -> 
     return [(compound, colour) for colour, compound in compounds.items()]
 
 
-def _labels(sequence: TDF_LabelSequence) -> Iterator[TDF_Label]:
+def _labels(sequence: LabelSequence) -> Iterator[TDF_Label]:
     return (sequence.Value(number) for number in range(1, sequence.Length() + 1))

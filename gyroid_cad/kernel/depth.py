@@ -1,4 +1,4 @@
-"""How deep places in a solid lie below its faces, and whether what is left inside a skin lies as deep as it should."""
+"""Depth of points below a solid's faces, by which the core that a skin leaves is confirmed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
@@ -17,9 +15,11 @@ from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_Context
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_OUT, TopAbs_State
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.split import inner_point
 
@@ -49,19 +49,15 @@ class Faces:
 
     def __init__(self, faces: Iterable[TopoDS_Shape]) -> None:
         self._faces = list(faces)
-        corners = []
-        for face in self._faces:
-            box = Bnd_Box()
-            BRepBndLib.Add_s(face, box)
-            corners.append(box.Get())
-        self._corners = np.array(corners).reshape(-1, 6)
+        corners = [corners_of(box_round([face])) for face in self._faces]
+        self._low, self._high = np.array(corners).reshape(-1, 2, 3).transpose(1, 0, 2)
 
     def __bool__(self) -> bool:
         return bool(self._faces)
 
     def distance(self, point: Floats) -> float:
-        """Of a point, shape (3,), from the nearest of them, in mm; infinite if there are none."""
-        away = np.maximum(np.maximum(self._corners[:, :3] - point, point - self._corners[:, 3:]), 0)
+        """Distance of a point, shape (3,), from the nearest face, in mm; infinite if there are none."""
+        away = np.maximum(np.maximum(self._low - point, point - self._high), 0)
         at_least = np.linalg.norm(away, axis=1)
         vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
         nearest = np.inf
@@ -74,12 +70,12 @@ class Faces:
         return float(nearest)
 
     def distances(self, points: Floats) -> Floats:
-        """Of points, shape (n, 3); shape (n,)."""
+        """Distances of points, shape (n, 3), from the nearest face, in mm; shape (n,)."""
         return np.array([self.distance(point) for point in points])
 
 
 class Depths:
-    """How deep places in a solid lie below those of its faces that are no openings.
+    """Depth of points in a solid below those of its faces that are no openings.
 
     Parameters
     ----------
@@ -110,7 +106,7 @@ class Depths:
         return float(depths.max(initial=0.0))
 
     def confirm(self, core: Sequence[TopoDS_Solid], skin: float) -> bool:
-        """Whether solids are closed, valid, and what is left of this one less a skin, as far as points tell."""
+        """Confirm that solids are closed, valid, and what a skin leaves of this one, as far as points tell."""
         if not core or any(measure(one)[0] <= 0 or not is_valid(one) or not topology(one).closed for one in core):
             return False
         least, most = _THINNEST * skin, _THICKEST * skin
@@ -129,7 +125,7 @@ class Depths:
                 if all(state == TopAbs_OUT for state in state_in_core(point)):
                     return False
         faces = (face for one in core for face in parts_of(one, TopAbs_FACE))
-        return all(self._as_deep(TopoDS.Face_s(face), skin) for face in faces)
+        return all(self._as_deep(as_face(face), skin) for face in faces)
 
     def _as_deep(self, face: TopoDS_Face, skin: float) -> bool:
         classifier = BRepClass3d_SolidClassifier(self._solid)
@@ -146,12 +142,10 @@ class Depths:
     @cached_property
     def _inside(self) -> tuple[Floats, Floats]:
         """Points all over the solid, shape (n, 3), and their depths."""
-        box = Bnd_Box()
-        BRepBndLib.Add_s(self._solid, box)
-        corners = np.array(box.Get())
+        low, high = corners_of(box_round([self._solid]))
         found: list[Floats] = []
         for _ in range(_BATCHES):
-            points = self._random.uniform(corners[:3], corners[3:], (_POINTS_INSIDE, 3))
+            points = self._random.uniform(low, high, (_POINTS_INSIDE, 3))
             found.append(points[self._held(points)])
             if sum(map(len, found)) >= _POINTS_INSIDE:
                 break

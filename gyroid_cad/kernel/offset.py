@@ -1,7 +1,7 @@
 """The kernel's ways to offset a solid, tried in a process of its own.
 
 They crash on some solids, and not every time; on others they do not end. What they give is not to be trusted either:
-that is for :mod:`gyroid_cad.kernel.core` to find out.
+that is for :mod:`gyroid_cad.kernel.offset` to find out.
 """
 
 from __future__ import annotations
@@ -11,27 +11,35 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
 from OCP.BinTools import BinTools
+from OCP.BOPAlgo import BOPAlgo_Tools
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.BRepClass3d import BRepClass3d
 from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
-from OCP.BRepOffsetAPI import BRepOffsetAPI_MakeOffsetShape, BRepOffsetAPI_MakeThickSolid
-from OCP.GeomAbs import GeomAbs_Arc, GeomAbs_Intersection, GeomAbs_JoinType
+from OCP.BRepOffsetAPI import BRepOffsetAPI_MakeOffset, BRepOffsetAPI_MakeOffsetShape, BRepOffsetAPI_MakeThickSolid
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+from OCP.GeomAbs import GeomAbs_Arc, GeomAbs_Intersection, GeomAbs_JoinType, GeomAbs_Plane
+from OCP.gp import gp_Trsf, gp_Vec
 from OCP.ShapeCustom import ShapeCustom
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
-from OCP.TopTools import TopTools_ListOfShape
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
+from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
+from gyroid_cad.kernel.depth import Depths
 
-__all__ = ["CLOSED_WAYS", "OPEN_WAYS", "offsets", "work"]
+__all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
 
 Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 
@@ -44,7 +52,7 @@ _SOLID = "solid.bin"
 def offsets(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, ways: Sequence[str]
 ) -> Generator[TopoDS_Shape | None]:
-    """What each way of offsetting leaves of a solid inside a skin; None where one fails, crashes or does not end.
+    """Solids that each way of offsetting leaves inside a skin; None where one fails, crashes or does not end.
 
     Parameters
     ----------
@@ -101,8 +109,8 @@ def work() -> None:
     for way in ways:
         given = _read(Path(folder, _SOLID))
         place = _place(given)
-        solid = TopoDS.Solid_s(given.Moved(place.Inverted()))
-        faces = [TopoDS.Face_s(face) for face in parts_of(solid, TopAbs_FACE)]
+        solid = as_solid(given.Moved(place.Inverted()))
+        faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
         unfinished = Path(folder, f"{way}, unfinished")
         unfinished.touch()
         try:
@@ -136,11 +144,11 @@ def _offset(solid: TopoDS_Solid, by: float, join: GeomAbs_JoinType, together: bo
 
 
 def _place(shape: TopoDS_Shape) -> TopLoc_Location:
-    """Where a sphere in it has been moved to, or it itself: the kernel seeks a moved sphere's poles where they were."""
+    """Move a surface's sphere for good, for the kernel seeks a moved sphere's poles where they were."""
     for face in parts_of(shape, TopAbs_FACE):
-        if any(BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)) for edge in parts_of(face, TopAbs_EDGE)):
+        if any(BRep_Tool.Degenerated_s(as_edge(edge)) for edge in parts_of(face, TopAbs_EDGE)):
             place = TopLoc_Location()
-            BRep_Tool.Surface_s(TopoDS.Face_s(face), place)
+            BRep_Tool.Surface_s(as_face(face), place)
             return place
     return shape.Location()
 
@@ -148,7 +156,7 @@ def _place(shape: TopoDS_Shape) -> TopLoc_Location:
 def _less_thick_skin(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, join: GeomAbs_JoinType
 ) -> TopoDS_Shape:
-    closing = TopTools_ListOfShape()
+    closing = ShapeList()
     for face in openings:
         closing.Append(face)
     maker = BRepOffsetAPI_MakeThickSolid()
@@ -194,3 +202,85 @@ def _solid_of(shell: TopoDS_Shape) -> TopoDS_Solid:
     builder.MakeSolid(solid)
     builder.Add(solid, shell)
     return solid
+
+
+def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, depths: Depths) -> list[TopoDS_Solid]:
+    """Offset a solid inwards by a skin on all its faces but the openings.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+    openings : sequence of TopoDS_Face
+        Of the solid's faces.
+    skin : float
+        In mm; less than the solid is deep.
+    depths : Depths
+        Of this solid with these openings.
+
+    Returns
+    -------
+    list of TopoDS_Solid
+        They share nothing with the solid.
+
+    Raises
+    ------
+    KernelError
+        If none of the kernel's ways to offset gives a core whose points lie as deep as they should.
+    """
+    with closing(_attempts(solid, openings, skin)) as attempts:
+        for core in attempts:
+            if depths.confirm(core, skin):
+                return core
+    raise KernelError(f"the kernel cannot offset the part by {skin:g} mm; without a skin it can still be filled")
+
+
+def _attempts(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> Generator[list[TopoDS_Solid]]:
+    ways = list(CLOSED_WAYS)
+    if openings and sum(1 for _ in parts_of(solid, TopAbs_SHELL)) == 1:
+        ways = [*OPEN_WAYS, *ways]
+    with closing(offsets(solid, openings, skin, ways)) as found:
+        for way, core in zip(ways, found, strict=True):
+            if core is not None:
+                yield _solids_in(_opened(core, openings, skin) if way in CLOSED_WAYS else core)
+
+
+def _opened(core: TopoDS_Shape, openings: Sequence[TopoDS_Face], skin: float) -> TopoDS_Shape:
+    """A core without openings, carried on straight to those openings that are flat.
+
+    For openings that pass into other faces smoothly, where the kernel finds no border between core and skin, and for
+    solids with voids.
+    """
+    for face in openings:
+        surface = BRepAdaptor_Surface(face)
+        if surface.GetType() != GeomAbs_Plane:
+            continue
+        outwards = gp_Vec(surface.Plane().Axis().Direction()) * skin
+        if (face.Orientation() == TopAbs_REVERSED) == surface.Plane().Direct():
+            outwards.Reverse()
+        try:
+            floor = BRepAlgoAPI_Common(_moved(_inset(face, skin), outwards.Reversed()), core).Shape()
+            core = BRepAlgoAPI_Fuse(core, BRepPrimAPI_MakePrism(floor, outwards).Shape()).Shape()
+        except Exception:
+            # As many kinds of failure as there are algorithms; an opening that stays closed is found later.
+            continue
+    return core
+
+
+def _inset(face: TopoDS_Face, by: float) -> TopoDS_Shape:
+    """A flat face without a strip along its border."""
+    rim = BRepOffsetAPI_MakeOffset(face, GeomAbs_Arc)
+    rim.Perform(-by)
+    faces = TopoDS_Compound()
+    BRep_Builder().MakeCompound(faces)
+    BOPAlgo_Tools.WiresToFaces_s(rim.Shape(), faces)
+    return faces
+
+
+def _moved(shape: TopoDS_Shape, by: gp_Vec) -> TopoDS_Shape:
+    move = gp_Trsf()
+    move.SetTranslation(by)
+    return BRepBuilderAPI_Transform(shape, move, True).Shape()
+
+
+def _solids_in(shape: TopoDS_Shape) -> list[TopoDS_Solid]:
+    return [] if shape.IsNull() else [as_solid(solid) for solid in parts_of(shape, TopAbs_SOLID)]

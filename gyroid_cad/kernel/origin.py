@@ -1,4 +1,4 @@
-"""Which kernel it is that is loaded."""
+"""Origin of the kernel that is loaded."""
 
 from __future__ import annotations
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepGProp import BRepGProp
@@ -22,11 +20,12 @@ from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.trim.box import Box
 
 __all__ = ["Part", "measure", "require_part"]
@@ -66,8 +65,8 @@ class Part:
     volume: float
     box: Box | None = None
 
-    def holds(self, points: Floats) -> Booleans:
-        """Which points, shape (n, 3), lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
+    def contains(self, points: Floats) -> Booleans:
+        """Mask of the points, shape (n, 3), that lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
         inside = np.zeros(len(points), dtype=bool)
         for solid in self.solids:
             classifier = BRepClass3d_SolidClassifier(solid)
@@ -106,7 +105,7 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     """
     if shape is None or shape.IsNull():
         raise ParameterError(parameter, shape, "a shape that holds a solid, not an empty one")
-    solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(shape, TopAbs_SOLID))
+    solids = tuple(as_solid(solid) for solid in parts_of(shape, TopAbs_SOLID))
     kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
     if not solids:
         raise ParameterError(parameter, kind, "a closed solid: there is none in it")
@@ -120,24 +119,22 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
         volumes.append(measure(solid)[0])
         if not volumes[-1] > 0:
             raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    corners = np.array(box.Get())
+    low, high = bounding_box(shape)
     divided = _without_seams(shape)
-    solids = tuple(TopoDS.Solid_s(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, corners[:3], corners[3:], sum(volumes), _box_of(solids))
+    solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
+    return Part(divided, solids, low, high, sum(volumes), _box_of(solids))
 
 
 def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
     """The box that the solids are, if they are one box: six planes, and eight corners where a box has them."""
     if len(solids) != 1:
         return None
-    faces = [TopoDS.Face_s(face) for face in parts_of(solids[0], TopAbs_FACE)]
+    faces = [as_face(face) for face in parts_of(solids[0], TopAbs_FACE)]
     if len(faces) != _BOX_FACES or any(BRepAdaptor_Surface(face).GetType() != GeomAbs_Plane for face in faces):
         return None
-    corners = TopTools_IndexedMapOfShape()
+    corners = NumberedShapes()
     TopExp.MapShapes_s(solids[0], TopAbs_VERTEX, corners)
-    places = (BRep_Tool.Pnt_s(TopoDS.Vertex_s(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
+    places = (BRep_Tool.Pnt_s(as_vertex(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
     points = np.array([(place.X(), place.Y(), place.Z()) for place in places])
     normals = [BRepAdaptor_Surface(face).Plane().Axis().Direction() for face in faces]
     directions = np.array([(normal.X(), normal.Y(), normal.Z()) for normal in normals])
@@ -177,7 +174,7 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Corners of the triangles of each meshed face: three arrays of shape (triangles, 3)."""
     for part in parts_of(shape, TopAbs_FACE):
         location = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(TopoDS.Face_s(part), location)
+        mesh = BRep_Tool.Triangulation_s(as_face(part), location)
         if mesh is None:
             continue
         move = location.Transformation()

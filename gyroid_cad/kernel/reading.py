@@ -8,32 +8,37 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
-from OCP.BRep import BRep_Builder
-from OCP.BRepBndLib import BRepBndLib
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepTools import BRepTools
-from OCP.TopoDS import TopoDS_Shape
+from OCP.Geom import Geom_BSplineSurface
+from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.check import Topology, is_valid, topology
+from gyroid_cad.kernel.check import Topology, is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step
-from gyroid_cad.kernel.stl import meshed
+from gyroid_cad.kernel.stl import diagonal, meshed_by_face
 
-__all__ = ["Described", "described", "read_shape", "shown_triangles"]
+__all__ = ["Described", "described", "lattice_sides", "read_shape", "shown_triangles"]
 
 Floats = NDArray[np.float64]
 
-# Of triangles to look at, in parts of the largest extent; and between them, in degrees.
-_SHOWN_DEVIATION = 1e-3
+# Of triangles to look at, in parts of the diagonal; and between them, in degrees.
+_SHOWN_DEVIATION = 5e-4
 _SHOWN_ANGLE = 20.0
+# Of what is read from files that were written with so many digits.
+_PARAMETER_TOLERANCE = 1e-9
 # What the first lines of a BREP file say, and how many bytes these take at most.
 _BREP_MARK, _BREP_HEADER = b"CASCADE Topology V", 400
 
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What the kernel finds a shape to be.
+    """Measures of a shape, as the kernel finds them.
 
     Attributes
     ----------
@@ -78,20 +83,30 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
 
 def described(shape: TopoDS_Shape) -> Described:
     """Measure and check a shape, whatever it is."""
-    box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape, box, False, False)
-    corners = (0.0,) * 6 if box.IsVoid() else box.Get()
+    low, high = bounding_box(shape).tolist()
     volume, area = measure(shape)
-    return Described(topology(shape), is_valid(shape), tuple(corners[:3]), tuple(corners[3:]), volume, area)
+    return Described(topology(shape), is_valid(shape), tuple(low), tuple(high), volume, area)
 
 
-def shown_triangles(shape: TopoDS_Shape, extent: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Triangles to look at: vertices and their numbers, as of :func:`gyroid_cad.kernel.stl.meshed`.
+def shown_triangles(shape: TopoDS_Shape) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+    """Triangles to look at: vertices, their numbers, and faces, as of :func:`gyroid_cad.kernel.stl.meshed_by_face`."""
+    return meshed_by_face(shape, "the picture", max(_SHOWN_DEVIATION * diagonal(shape), 1e-6), _SHOWN_ANGLE)
 
-    Parameters
-    ----------
-    shape : TopoDS_Shape
-    extent : float
-        The largest, in mm.
+
+def lattice_sides(shape: TopoDS_Shape) -> list[int | None]:
+    """The side of the wall that each face is a part of, as ``TopExp_Explorer`` counts faces: 0 or 1.
+
+    None of those that are no part of a lattice's faces. These are told by their surfaces, cubic B-splines on the square
+    from -1 to 1 both ways, which run along the wall's normals: on side 0 the face is turned against its surface.
     """
-    return meshed(shape, "the picture", max(_SHOWN_DEVIATION * extent, 1e-6), _SHOWN_ANGLE)
+    return [_lattice_side(as_face(face)) for face in parts_of(shape, TopAbs_FACE)]
+
+
+def _lattice_side(face: TopoDS_Face) -> int | None:
+    surface = BRep_Tool.Surface_s(face, TopLoc_Location())
+    if not isinstance(surface, Geom_BSplineSurface):
+        return None
+    cubic = (surface.UDegree(), surface.VDegree()) == (3, 3)
+    if not cubic or not np.allclose(surface.Bounds(), (-1, 1, -1, 1), rtol=0, atol=_PARAMETER_TOLERANCE):
+        return None
+    return 0 if face.Orientation() == TopAbs_REVERSED else 1

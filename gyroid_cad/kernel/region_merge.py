@@ -1,4 +1,4 @@
-"""What was found region by region put together: what is shared made one, the part's boundary split to match."""
+"""Merge of the regions' pieces: what they share made one, the part's boundary split to match."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from OCP.TopAbs import (
 )
 from OCP.TopExp import TopExp
 from OCP.TopoDS import (
-    TopoDS,
     TopoDS_Edge,
     TopoDS_Face,
     TopoDS_Iterator,
@@ -32,8 +31,9 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
+from gyroid_cad.kernel.compat import as_edge, as_face, as_vertex
 from gyroid_cad.kernel.region_split import NEW, Edge, Found, Piece, Task, all_of, place_of
-from gyroid_cad.kernel.split import Pieces, changes, compound_of, general_fuse, images, running_like
+from gyroid_cad.kernel.split import Pieces, changes, compound_of, general_fuse, modified, running_like
 
 __all__ = ["Joining"]
 
@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 
 
 class Joining:
-    """What was found in the regions put together, and the part's boundary split to match."""
+    """Pieces of all regions put together, and the part's boundary split to match."""
 
     def __init__(self, task: Task, found: Sequence[Found]) -> None:
         self.task = task
@@ -69,9 +69,9 @@ class Joining:
             for piece in region.pieces
         ]
         boundary = [
-            (TopoDS.Face_s(piece), number)
+            (as_face(piece), number)
             for number, face in enumerate(self.task.boundary)
-            for piece in (images(fuse, face) if fuse else [face])
+            for piece in (modified(fuse, face) if fuse else [face])
         ]
         return Pieces(
             tuple(inside),
@@ -114,7 +114,7 @@ class Joining:
     def _make_vertices(self) -> dict[int, TopoDS_Vertex]:
         """By number: the lattice's own, where no region has another one for it."""
         lattice = self.task.vertex_count
-        found = [TopoDS.Vertex_s(vertex) for vertex in all_of(self.task.vertices)]
+        found = [as_vertex(vertex) for vertex in all_of(self.task.vertices)]
         old = np.array([[*place_of(vertex), BRep_Tool.Tolerance_s(vertex)] for vertex in found]).reshape(-1, 4)
         balls = np.concatenate([old, self.points])
         members: dict[int, list[int]] = {}
@@ -135,7 +135,7 @@ class Joining:
     def _edges_on_boundary(self, number: int) -> dict[int, TopoDS_Edge]:
         """A region's edges that lie on the part's boundary, by their numbers."""
         region = self.found[number]
-        sections, grounds, sides = self._read(region)
+        sections, supporting_faces, sides = self._read(region)
         users: dict[int, set[int]] = {}
         for piece in region.pieces:
             for index in piece.edges():
@@ -143,7 +143,7 @@ class Joining:
         made = {}
         for index, edge in enumerate(region.edges):
             if edge.origin == NEW:
-                lying_on = [(self.task.faces[face], grounds[face]) for face in users[index]]
+                lying_on = [(self.task.faces[face], supporting_faces[face]) for face in users[index]]
                 lying_on += [(self.task.boundary[face], sides[face]) for face in edge.beside]
                 made[index] = self._section(next(sections), self._ends(number, edge), lying_on)
             elif edge.beside:
@@ -156,10 +156,10 @@ class Joining:
         BinTools.Read_s(shape, io.BytesIO(region.shapes))
         shapes = list(_members(shape))
         count = sum(edge.origin == NEW for edge in region.edges)
-        faces = [TopoDS.Face_s(face) for face in shapes[count:]]
-        lattice, part = region.grounds
+        faces = [as_face(face) for face in shapes[count:]]
+        lattice, part = region.supporting_faces
         return (
-            (TopoDS.Edge_s(edge) for edge in shapes[:count]),
+            (as_edge(edge) for edge in shapes[:count]),
             dict(zip(lattice, faces, strict=False)),
             dict(zip(part, faces[len(lattice) :], strict=True)),
         )
@@ -188,9 +188,9 @@ class Joining:
         ends = self._ends(number, edge)
         key = (edge.origin, self._number(number, edge.ends[0]), self._number(number, edge.ends[1]))
         if key not in self.lattice_edges:
-            old = TopoDS.Edge_s(self.task.edges.FindKey(edge.origin + 1).Oriented(TopAbs_FORWARD))
+            old = as_edge(self.task.edges.FindKey(edge.origin + 1).Oriented(TopAbs_FORWARD))
             if not (ends[0].IsSame(TopExp.FirstVertex_s(old)) and ends[1].IsSame(TopExp.LastVertex_s(old))):
-                old = TopoDS.Edge_s(old.EmptyCopied())
+                old = as_edge(old.EmptyCopied())
                 self._bound(old, ends, edge.limits)
             self.lattice_edges[key] = old
         return self.lattice_edges[key]
@@ -205,10 +205,10 @@ class Joining:
         self.builder.Range(edge, *limits)
 
     def _take_over_vertices(self, fuse: BOPAlgo_Builder) -> None:
-        """What vertices have become, with the part's boundary split."""
+        """Take over the vertices as they are with the part's boundary split."""
         for number, vertex in self.vertices.items():
-            for image in images(fuse, vertex):
-                self.vertices[number] = TopoDS.Vertex_s(image)
+            for image in modified(fuse, vertex):
+                self.vertices[number] = as_vertex(image)
 
     def _face(
         self, number: int, piece: Piece, on_boundary: dict[int, TopoDS_Edge], fuse: BOPAlgo_Builder | None
@@ -221,7 +221,7 @@ class Joining:
         ]
         if piece.whole and all(self.task.edges.Contains(edge) for wire in wires for edge in wire):
             return old
-        face = TopoDS.Face_s(old.Oriented(TopAbs_FORWARD).EmptyCopied())
+        face = as_face(old.Oriented(TopAbs_FORWARD).EmptyCopied())
         for edges in wires:
             wire = TopoDS_Wire()
             self.builder.MakeWire(wire)
@@ -231,7 +231,7 @@ class Joining:
                 self.builder.Add(wire, edge)
             wire.Closed(BRep_Tool.IsClosed_s(wire))
             self.builder.Add(face, wire)
-        return TopoDS.Face_s(face.Oriented(piece.orientation))
+        return as_face(face.Oriented(piece.orientation))
 
     def _uses(
         self,
@@ -241,14 +241,14 @@ class Joining:
         on_boundary: dict[int, TopoDS_Edge],
         fuse: BOPAlgo_Builder | None,
     ) -> list[TopoDS_Edge]:
-        """What an edge of a piece has become, in the order and the way that the piece runs through it."""
+        """Edges that an edge of a piece has become, in the order and the way that the piece runs through it."""
         if fuse is None or index not in on_boundary:
-            return [TopoDS.Edge_s(self._lattice_edge(number, self.found[number].edges[index]).Oriented(way))]
+            return [as_edge(self._lattice_edge(number, self.found[number].edges[index]).Oriented(way))]
         whole = on_boundary[index]
-        runs = [running_like(whole, image, self.context) for image in images(fuse, whole)]
+        runs = [running_like(whole, image, self.context) for image in modified(fuse, whole)]
         if way == TopAbs_FORWARD:
-            return [TopoDS.Edge_s(run) for run in runs]
-        return [TopoDS.Edge_s(run.Reversed()) for run in reversed(runs)]
+            return [as_edge(run) for run in runs]
+        return [as_edge(run.Reversed()) for run in reversed(runs)]
 
 
 def _unite(same: list[int], one: int, other: int) -> None:

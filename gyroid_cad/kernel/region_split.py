@@ -1,4 +1,4 @@
-"""What a region's faces of a lattice leave in a part, described so that it can be sent to another process.
+"""Split of a region's lattice faces by a part, described so that it can be sent to another process.
 
 Edges and vertices of the lattice go by their numbers: the other process has them. Only sections are sent as shapes.
 """
@@ -13,9 +13,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BinTools import BinTools
-from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.IntTools import IntTools_Context
 from OCP.TopAbs import (
@@ -29,17 +27,17 @@ from OCP.TopAbs import (
 )
 from OCP.TopExp import TopExp
 from OCP.TopoDS import (
-    TopoDS,
     TopoDS_Edge,
     TopoDS_Face,
     TopoDS_Shape,
     TopoDS_Vertex,
 )
-from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part
-from gyroid_cad.kernel.split import compound_of, general_fuse, images, lies_in
+from gyroid_cad.kernel.split import compound_of, general_fuse, lies_in, modified
 
 __all__ = ["NEW", "Edge", "Finding", "Found", "Piece", "Task", "Values", "all_of", "map_of", "place_of"]
 
@@ -55,17 +53,17 @@ NEW = -1
 
 
 class Task:
-    """What is to be split, with numbers for faces, edges and vertices on which all processes agree."""
+    """Work to be split, with numbers for faces, edges and vertices on which all processes agree."""
 
     def __init__(self, part: Part, faces: Sequence[TopoDS_Shape]) -> None:
         self.part = part
-        self.faces = [TopoDS.Face_s(face) for face in faces]
-        self.boundary = [TopoDS.Face_s(face) for face in parts_of(part.shape, TopAbs_FACE)]
+        self.faces = [as_face(face) for face in faces]
+        self.boundary = [as_face(face) for face in parts_of(part.shape, TopAbs_FACE)]
         self.edges = map_of(self.faces, TopAbs_EDGE)
         self.vertices = map_of(self.faces, TopAbs_VERTEX)
         self.vertex_count = int(self.vertices.Extent())
-        corners = np.array([box_of(face).Get() for face in self.faces])
-        self.regions = _regions((corners[:, :3] + corners[:, 3:]) / 2, np.arange(len(faces)))
+        corners = np.array([corners_of(box_round([face])) for face in self.faces])
+        self.regions = _regions(corners.mean(axis=1), np.arange(len(faces)))
 
 
 def _regions(centres: Floats, numbers: NDArray[np.intp]) -> list[list[int]]:
@@ -115,7 +113,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is left of a region's faces in the part.
+    """Pieces of a region's faces that are left in the part.
 
     Attributes
     ----------
@@ -125,7 +123,7 @@ class Found:
         For each of them, the number of the lattice's vertex it stands for, or ``NEW``.
     edges : list of Edge
     pieces : list of Piece
-    grounds : (list of int, list of int)
+    supporting_faces : (list of int, list of int)
         Faces of the lattice, and of the part, on which the sections lie.
     shapes : bytes
         A compound of the sections, in the order of the edges; then of those faces, without edges.
@@ -135,7 +133,7 @@ class Found:
     moved: list[int]
     edges: list[Edge]
     pieces: list[Piece]
-    grounds: tuple[list[int], list[int]]
+    supporting_faces: tuple[list[int], list[int]]
     shapes: bytes
 
 
@@ -143,7 +141,7 @@ class Values(Generic[Value]):
     """Values by shapes, whichever way these run."""
 
     def __init__(self) -> None:
-        self._shapes = TopTools_IndexedMapOfShape()
+        self._shapes = NumberedShapes()
         self._values: list[Value] = []
 
     def setdefault(self, shape: TopoDS_Shape, value: Value) -> Value:
@@ -179,52 +177,52 @@ class Finding:
         context = IntTools_Context()
         classifiers = [BRepClass3d_SolidClassifier(solid) for solid in self.task.part.solids]
         pieces = [
-            self._piece(number, TopoDS.Face_s(piece))
+            self._piece(number, as_face(piece))
             for number in self.region
-            for piece in images(self.fuse, self.task.faces[number])
+            for piece in modified(self.fuse, self.task.faces[number])
             if any(lies_in(piece, classifier, context) for classifier in classifiers)
         ]
         sections = {number for number, edge in enumerate(self.edges) if edge.origin == NEW}
-        grounds = (
+        supporting_faces = (
             sorted({piece.face for piece in pieces if not sections.isdisjoint(piece.edges())}),
             sorted({face for number in sections for face in self.edges[number].beside}),
         )
-        faces = [self.task.faces[face] for face in grounds[0]] + [self.task.boundary[face] for face in grounds[1]]
+        faces = [self.task.faces[face] for face in supporting_faces[0]] + [
+            self.task.boundary[face] for face in supporting_faces[1]
+        ]
         stream = io.BytesIO()
         BinTools.Write_s(compound_of([*self.sections, *(face.EmptyCopied() for face in faces)]), stream)
-        return Found(self.points, self.moved, self.edges, pieces, grounds, stream.getvalue())
+        return Found(self.points, self.moved, self.edges, pieces, supporting_faces, stream.getvalue())
 
     def _boundary_near(self, faces: Iterable[TopoDS_Face]) -> list[TopoDS_Face]:
         """Faces of the part that some of a region's may meet; all of them, if none."""
-        box = Bnd_Box()
-        for face in faces:
-            BRepBndLib.Add_s(face, box)
+        box = box_round(faces)
         box.Enlarge(_APART)
-        return [face for face in self.task.boundary if not box.IsOut(box_of(face))] or self.task.boundary
+        return [face for face in self.task.boundary if not box.IsOut(box_round([face]))] or self.task.boundary
 
     def _faces_beside(self) -> Values[list[int]]:
         """The part's faces at every edge of their pieces."""
         beside: Values[list[int]] = Values()
         for number, face in enumerate(self.task.boundary):
-            for piece in images(self.fuse, face):
+            for piece in modified(self.fuse, face):
                 for edge in parts_of(piece, TopAbs_EDGE):
                     numbers = beside.setdefault(edge, [])
                     if number not in numbers:
                         numbers.append(number)
         return beside
 
-    def _origins(self, shapes: TopTools_IndexedMapOfShape, numbers: TopTools_IndexedMapOfShape) -> Values[int]:
+    def _origins(self, shapes: NumberedShapes, numbers: NumberedShapes) -> Values[int]:
         """The numbers of the lattice's edges or vertices by what they have become."""
         origins: Values[int] = Values()
         for shape in all_of(shapes):
-            for image in images(self.fuse, shape):
+            for image in modified(self.fuse, shape):
                 origins.setdefault(image, numbers.FindIndex(shape) - 1)
         return origins
 
     def _piece(self, number: int, piece: TopoDS_Face) -> Piece:
         whole = bool(piece.IsSame(self.task.faces[number]))
         wires = tuple(
-            tuple((self._edge(TopoDS.Edge_s(edge), number), edge.Orientation()) for edge in parts_of(wire, TopAbs_EDGE))
+            tuple((self._edge(as_edge(edge), number), edge.Orientation()) for edge in parts_of(wire, TopAbs_EDGE))
             for wire in parts_of(piece.Oriented(TopAbs_FORWARD), TopAbs_WIRE)
         )
         return Piece(number, piece.Orientation(), whole, wires)
@@ -233,7 +231,7 @@ class Finding:
         """The number of an edge of a piece of a face."""
         number = self.edge_numbers.setdefault(edge, len(self.edges))
         if number == len(self.edges):
-            forward = TopoDS.Edge_s(edge.Oriented(TopAbs_FORWARD))
+            forward = as_edge(edge.Oriented(TopAbs_FORWARD))
             ends = self._vertex(TopExp.FirstVertex_s(forward)), self._vertex(TopExp.LastVertex_s(forward))
             origin = self.edge_origins.get(edge, NEW)
             if origin == NEW:
@@ -256,18 +254,12 @@ def place_of(vertex: TopoDS_Vertex) -> tuple[float, float, float]:
     return place.X(), place.Y(), place.Z()
 
 
-def box_of(shape: TopoDS_Shape) -> Bnd_Box:
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box)
-    return box
-
-
-def map_of(shapes: Iterable[TopoDS_Shape], kind: TopAbs_ShapeEnum) -> TopTools_IndexedMapOfShape:
-    numbers = TopTools_IndexedMapOfShape()
+def map_of(shapes: Iterable[TopoDS_Shape], kind: TopAbs_ShapeEnum) -> NumberedShapes:
+    numbers = NumberedShapes()
     for shape in shapes:
         TopExp.MapShapes_s(shape, kind, numbers)
     return numbers
 
 
-def all_of(numbers: TopTools_IndexedMapOfShape) -> Iterator[TopoDS_Shape]:
+def all_of(numbers: NumberedShapes) -> Iterator[TopoDS_Shape]:
     return (numbers.FindKey(number) for number in range(1, numbers.Extent() + 1))

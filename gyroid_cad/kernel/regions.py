@@ -86,7 +86,7 @@ _inherited: list[Task] = []
 
 
 def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
-    """What is found in each region."""
+    """Pieces found in each region."""
     before = multiprocessing.active_children()
     executor = ProcessPoolExecutor(
         min(processes, len(task.regions)),

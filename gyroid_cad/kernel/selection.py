@@ -13,11 +13,12 @@ from OCP.BRepGProp import BRepGProp
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_FACE
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part
 
 __all__ = ["selected_faces"]
@@ -49,12 +50,12 @@ def selected_faces(part: Part, openings: Sequence[Any]) -> list[TopoDS_Face]:
 
 
 def _selected(part: Part, given: Any) -> list[TopoDS_Face]:
-    faces = [TopoDS.Face_s(face) for face in parts_of(part.shape, TopAbs_FACE)]
+    faces = [as_face(face) for face in parts_of(part.shape, TopAbs_FACE)]
     if isinstance(given, str):
         return _furthest(part, faces, given)
     shape = getattr(given, "wrapped", given)
     if isinstance(shape, TopoDS_Shape):
-        found = [] if shape.IsNull() else [TopoDS.Face_s(face) for face in parts_of(shape, TopAbs_FACE)]
+        found = [] if shape.IsNull() else [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
         if not found:
             raise ParameterError("openings", given, _ACCEPTED)
         return found

@@ -17,15 +17,15 @@ from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepTools import BRepTools_ReShape
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
-from OCP.TopTools import TopTools_MapOfShape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
 
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of
-from gyroid_cad.kernel.core import core_of
+from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, Faces, points_on
+from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.split import Change, Pieces, compound_of, images, inner_sides, solids_of
+from gyroid_cad.kernel.split import Change, Pieces, compound_of, inner_sides, modified, solids_of
 
 __all__ = ["Hollow", "hollow", "openings_of"]
 
@@ -69,7 +69,7 @@ class Hollow:
             Faces that lie in the core uncut, oriented likewise.
         wanted_at : callable
             Whether a point, shape (3,), on the core's boundary belongs to the solid wanted: asked only of pieces of the
-            boundary that hang together with none that the lattice meets.
+            boundary that are connected with none that the lattice meets.
 
         Raises
         ------
@@ -78,12 +78,12 @@ class Hollow:
         """
         boundary = zip(pieces.boundary, pieces.origins, inner_sides(pieces, wanted_at), strict=True)
         ends = [
-            piece if inner else TopoDS.Face_s(piece.Reversed())
+            piece if inner else as_face(piece.Reversed())
             for piece, origin, inner in boundary
             if inner == self.opened[origin]
         ]
         skin = _with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
-        return solids_of([*skin, *pieces.inside, *map(TopoDS.Face_s, whole), *ends])
+        return solids_of([*skin, *pieces.inside, *map(as_face, whole), *ends])
 
 
 def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Hollow:
@@ -160,9 +160,9 @@ def _places(face: TopoDS_Face) -> Iterator[Floats]:
     """Points of a face, inside and on its border, the likeliest to tell it from another first."""
     yield from points_on(face, _POINTS_ON_FACE)
     for edge in parts_of(face, TopAbs_EDGE):
-        if BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
+        if BRep_Tool.Degenerated_s(as_edge(edge)):
             continue
-        curve = BRepAdaptor_Curve(TopoDS.Edge_s(edge))
+        curve = BRepAdaptor_Curve(as_edge(edge))
         for place in np.linspace(curve.FirstParameter(), curve.LastParameter(), _POINTS_ON_EDGE).tolist():
             point = curve.Value(place)
             yield np.array([point.X(), point.Y(), point.Z()])
@@ -196,18 +196,18 @@ def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face]) -> Hollow:
     fuse.Perform()
     if fuse.HasErrors():
         raise KernelError("the kernel could not part the skin from its core at the openings")
-    solids = [TopoDS.Solid_s(image) for solid in core.solids for image in images(fuse, solid)]
+    solids = [as_solid(image) for solid in core.solids for image in modified(fuse, solid)]
     core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
-    inner, ends = TopTools_MapOfShape(), TopTools_MapOfShape()
+    inner, ends = ShapeSet(), ShapeSet()
     for face in _faces_of(core.shape):
         inner.Add(face)
     for opening in openings:
-        found = [image for image in images(fuse, opening) if inner.Contains(image)]
+        found = [image for image in modified(fuse, opening) if inner.Contains(image)]
         if not found:
             raise KernelError("the kernel's core does not come to an opening")
         for image in found:
             ends.Add(image)
-    pieces = (TopoDS.Face_s(piece) for face in _faces_of(part.shape) for piece in images(fuse, face))
+    pieces = (as_face(piece) for face in _faces_of(part.shape) for piece in modified(fuse, face))
     skin = tuple(piece for piece in pieces if not inner.Contains(piece))
     made = Hollow(skin, core, tuple(bool(ends.Contains(face)) for face in _faces_of(core.shape)))
     _require_all_of(part, made)
@@ -235,11 +235,11 @@ def _with_changes(faces: Iterable[TopoDS_Face], changed: Iterable[Change]) -> li
             reshape.Replace(old, wire)
         else:
             reshape.Replace(old, new[0])
-    return [TopoDS.Face_s(reshape.Apply(face)) for face in faces]
+    return [as_face(reshape.Apply(face)) for face in faces]
 
 
 def _faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
-    return [TopoDS.Face_s(face) for face in parts_of(shape, TopAbs_FACE)]
+    return [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
 
 
 def _has(solid: TopoDS_Solid, face: TopoDS_Face) -> bool:

@@ -17,7 +17,6 @@ from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHE
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import (
-    TopoDS,
     TopoDS_Compound,
     TopoDS_Edge,
     TopoDS_Face,
@@ -28,8 +27,8 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
-from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry, parameter_line
-from gyroid_cad.kernel.surfaces import kernel_curve
+from gyroid_cad.kernel.compat import as_compound, as_face, as_shell, as_solid
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, parameter_line
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.wall.offset import SIDES, Wall
 
@@ -37,10 +36,10 @@ __all__ = [
     "TOLERANCE",
     "KernelShape",
     "another_handle",
+    "build_faces",
+    "build_patches",
+    "build_solid",
     "faces_by_patch",
-    "realise",
-    "realise_faces",
-    "realise_patches",
 ]
 
 KernelShape: TypeAlias = TopoDS_Shape
@@ -49,7 +48,7 @@ KernelShape: TypeAlias = TopoDS_Shape
 _CORNER_INDEX = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 
 
-def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
+def build_solid(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
     """Build the closed solid round a wall.
 
     Parameters
@@ -66,7 +65,7 @@ def realise(wall: Wall, progress: Callable[[int, int], None] | None = None) -> T
     return _Realisation(wall).build(progress or (lambda done, total: None))
 
 
-def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
+def build_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
     """The two faces of every patch, without side walls, neighbours sharing their edges.
 
     Parameters
@@ -81,13 +80,13 @@ def realise_faces(wall: Wall) -> list[tuple[TopoDS_Face, TopoDS_Face]]:
     return _Realisation(wall).faces()
 
 
-def realise_patches(wall: Wall) -> list[list[TopoDS_Face]]:
+def build_patches(wall: Wall) -> list[list[TopoDS_Face]]:
     """All faces of every patch of a closed wall, its free side walls too, oriented outwards and sharing their edges."""
     return _Realisation(wall).patches()
 
 
 def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
-    """The faces of a solid made by :func:`realise`, by patch: side 0, side 1, then its free side walls.
+    """The faces of a solid made by :func:`build_solid`, by patch: side 0, side 1, then its free side walls.
 
     Parameters
     ----------
@@ -99,7 +98,7 @@ def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
     explorer = TopExp_Explorer(solid, TopAbs_FACE)
     faces: list[TopoDS_Face] = []
     while explorer.More():
-        faces.append(TopoDS.Face_s(explorer.Current()))
+        faces.append(as_face(explorer.Current()))
         explorer.Next()
     counts = len(SIDES) + wall.complex.free[wall.complex.patch_edges].sum(axis=1)
     ends = np.cumsum(counts).tolist()
@@ -107,8 +106,8 @@ def faces_by_patch(solid: TopoDS_Shape, wall: Wall) -> list[list[TopoDS_Face]]:
 
 
 def another_handle(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """The same topology and geometry under a handle of its own: moving one does not move the other."""
-    casts = {TopAbs_SOLID: TopoDS.Solid_s, TopAbs_SHELL: TopoDS.Shell_s, TopAbs_COMPOUND: TopoDS.Compound_s}
+    """Another handle on a shape's topology and geometry: moving one does not move the other."""
+    casts = {TopAbs_SOLID: as_solid, TopAbs_SHELL: as_shell, TopAbs_COMPOUND: as_compound}
     return casts[shape.ShapeType()](shape.Located(TopLoc_Location()))
 
 
@@ -152,7 +151,7 @@ class _Realisation:
     def _patch_faces(self, patch: int) -> list[TopoDS_Face]:
         sides = [k for k in range(4) if self.free[self.patch_edges[patch][k]]]
         return [
-            TopoDS.Face_s(self._make_face(patch, 0).Oriented(TopAbs_REVERSED)),
+            as_face(self._make_face(patch, 0).Oriented(TopAbs_REVERSED)),
             self._make_face(patch, 1),
             *(self._make_side_wall(patch, k) for k in sides),
         ]
@@ -213,7 +212,9 @@ class _Realisation:
             for index, patch in enumerate(owner):
                 k = self.patch_edges[patch].index(index)
                 edge = TopoDS_Edge()
-                self.builder.MakeEdge(edge, self.geometry.rim(patch, k, side), self.geometry.location(patch), TOLERANCE)
+                self.builder.MakeEdge(
+                    edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE
+                )
                 start, end = fans[index]
                 self._bound(edge, self.vertices[side][start], self.vertices[side][end], -1.0, 1.0)
                 made.append(edge)

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.Bnd import Bnd_Box
 from OCP.BOPAlgo import BOPAlgo_Builder
 from OCP.BOPTools import BOPTools_AlgoTools, BOPTools_AlgoTools3D
 from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_Context
@@ -30,11 +28,13 @@ from OCP.TopAbs import (
     TopAbs_REVERSED,
     TopAbs_VERTEX,
 )
-from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
-from OCP.TopTools import TopTools_IndexedMapOfShape, TopTools_ListOfShape
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, ShapeList, as_edge, as_face
+from gyroid_cad.kernel.extent import box_round
 from gyroid_cad.kernel.part import Part
 
 __all__ = [
@@ -42,13 +42,13 @@ __all__ = [
     "bounded_solids",
     "changes",
     "compound_of",
+    "connected_shells",
     "general_fuse",
-    "images",
     "inner_point",
     "inner_sides",
     "lies_in",
+    "modified",
     "running_like",
-    "shells_of",
     "solids_of",
     "split",
 ]
@@ -62,7 +62,7 @@ _BOTH_WAYS = {TopAbs_FORWARD, TopAbs_REVERSED}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
-    """What is left of a part and of faces that were split against each other.
+    """Pieces of a part's boundary and of faces that were split against each other.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     KernelError
         If the kernel fails.
     """
-    boundary = [TopoDS.Face_s(face) for face in parts_of(part.shape, TopAbs_FACE)]
+    boundary = [as_face(face) for face in parts_of(part.shape, TopAbs_FACE)]
     if not faces:
         return Pieces((), tuple(boundary), tuple(range(len(boundary))))
     fuse = general_fuse(part.shape, compound_of(faces))
@@ -106,13 +106,13 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
     inside = [
         piece
         for face in faces
-        for piece in images(fuse, face)
+        for piece in modified(fuse, face)
         if any(lies_in(piece, classifier, context) for classifier in classifiers)
     ]
-    pieces = [(piece, index) for index, face in enumerate(boundary) for piece in images(fuse, face)]
+    pieces = [(piece, index) for index, face in enumerate(boundary) for piece in modified(fuse, face)]
     return Pieces(
-        tuple(TopoDS.Face_s(piece) for piece in inside),
-        tuple(TopoDS.Face_s(piece) for piece, _ in pieces),
+        tuple(as_face(piece) for piece in inside),
+        tuple(as_face(piece) for piece, _ in pieces),
         tuple(index for _, index in pieces),
         changes(fuse, part.shape),
     )
@@ -131,7 +131,7 @@ def bounded_solids(
         Faces that lie in the part uncut, oriented likewise.
     wanted_at : callable
         Whether a point, shape (3,), on the part's boundary belongs to the solid wanted: asked only of pieces of the
-        boundary that hang together with none that the lattice meets.
+        boundary that are connected with none that the lattice meets.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def bounded_solids(
         If the faces do not close, or do not agree on what is inside.
     """
     boundary = zip(pieces.boundary, inner_sides(pieces, wanted_at), strict=True)
-    return solids_of([*pieces.inside, *map(TopoDS.Face_s, whole), *(piece for piece, inner in boundary if inner)])
+    return solids_of([*pieces.inside, *map(as_face, whole), *(piece for piece, inner in boundary if inner)])
 
 
 def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
@@ -162,12 +162,12 @@ def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
     users = _users(faces)
     if any({use.orientation for use in uses} != _BOTH_WAYS or len(uses) != 2 for uses in users):
         raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
-    shells = [_shell([faces[index] for index in group]) for group in _connected(len(faces), users)]
+    shells = [_shell([faces[index] for index in group]) for group in _grouped(len(faces), users)]
     return _solids(shells)
 
 
-def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
-    """Faces in shells that hang together by edges, closed or not.
+def connected_shells(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
+    """Faces in shells that are connected by edges, closed or not.
 
     Parameters
     ----------
@@ -175,13 +175,13 @@ def shells_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
         Oriented alike.
     """
     users = _users(faces)
-    groups = _connected(len(faces), users)
+    groups = _grouped(len(faces), users)
     opened = {use.face for uses in users for use in uses if len(uses) != 2}
     return [_shell([faces[index] for index in group], opened.isdisjoint(group)) for group in groups]
 
 
 def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[bool]:
-    """Which pieces of the part's boundary lie on the inner side of the lattice faces they meet.
+    """Find the pieces of the part's boundary that lie on the inner side of the lattice faces they meet.
 
     Two faces of a solid run through their common edge in opposite ways: so a piece of the boundary is wanted if it
     runs against the lattice face along the edge they share. Across the part's own edges nothing changes.
@@ -257,12 +257,12 @@ def _decide(wanted: dict[int, bool], face: int, inner: bool) -> None:
 
 def _users(faces: Sequence[TopoDS_Face]) -> list[list[_Use]]:
     """For every edge, the faces it bounds."""
-    edges = TopTools_IndexedMapOfShape()
+    edges = NumberedShapes()
     users: list[list[_Use]] = []
     for index, face in enumerate(faces):
         for edge in parts_of(face, TopAbs_EDGE):
             # At the pole of a sphere: no other face is to be found there.
-            if BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
+            if BRep_Tool.Degenerated_s(as_edge(edge)):
                 continue
             number = edges.Add(edge)
             if number > len(users):
@@ -271,24 +271,13 @@ def _users(faces: Sequence[TopoDS_Face]) -> list[list[_Use]]:
     return users
 
 
-def _connected(count: int, users: list[list[_Use]]) -> list[list[int]]:
-    """Faces in groups that hang together by edges."""
-    beside: list[set[int]] = [set() for _ in range(count)]
-    for uses in users:
-        for use in uses:
-            beside[use.face].update(other.face for other in uses)
-    groups, seen = [], [False] * count
-    for start in range(count):
-        if seen[start]:
-            continue
-        seen[start], group = True, [start]
-        for face in group:
-            fresh = [other for other in beside[face] if not seen[other]]
-            group += fresh
-            for other in fresh:
-                seen[other] = True
-        groups.append(group)
-    return groups
+def _grouped(count: int, users: list[list[_Use]]) -> list[list[int]]:
+    """Faces in groups that are connected by edges."""
+    pairs = np.array([(uses[0].face, use.face) for uses in users for use in uses], dtype=np.int64).reshape(-1, 2)
+    groups: dict[int, list[int]] = {}
+    for face, label in enumerate(connected(count, *pairs.T).tolist()):
+        groups.setdefault(label, []).append(face)
+    return list(groups.values())
 
 
 def _shell(faces: Iterable[TopoDS_Face], closed: bool = True) -> TopoDS_Shell:
@@ -328,9 +317,7 @@ def _solids(shells: Sequence[TopoDS_Shell]) -> list[TopoDS_Solid]:
 
 
 def _extent(shape: TopoDS_Shape) -> float:
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box)
-    return float(box.SquareExtent())
+    return float(box_round([shape]).SquareExtent())
 
 
 def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
@@ -345,12 +332,12 @@ def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
     return fuse
 
 
-def images(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    """What a shape has become in a general fuse: itself, if nothing crossed it."""
+def modified(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """Shapes that a shape has become in a general fuse: itself, if nothing crossed it."""
     if fuse.IsDeleted(shape):
         return []
     # Taken off one by one: to iterate over a list of the kernel's ends in an exception, a hundred times as slow.
-    left = TopTools_ListOfShape(fuse.Modified(shape))
+    left = ShapeList(fuse.Modified(shape))
     found = []
     while not left.IsEmpty():
         found.append(left.First())
@@ -361,7 +348,7 @@ def images(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> list[TopoDS_Shape]:
 def changes(fuse: BOPAlgo_Builder, shape: TopoDS_Shape) -> tuple[Change, ...]:
     """Edges and vertices of a shape that a general fuse split or made anew, as of :class:`Pieces`."""
     context = IntTools_Context()
-    parts = TopTools_IndexedMapOfShape()
+    parts = NumberedShapes()
     for kind in (TopAbs_EDGE, TopAbs_VERTEX):
         for part in parts_of(shape, kind):
             parts.Add(part.Oriented(TopAbs_FORWARD))
@@ -380,13 +367,13 @@ def running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Con
     forward = piece.Oriented(TopAbs_FORWARD)
     if whole.ShapeType() != TopAbs_EDGE:
         return forward
-    backwards = BOPTools_AlgoTools.IsSplitToReverse_s(TopoDS.Edge_s(forward), TopoDS.Edge_s(whole), context, 0)
+    backwards = BOPTools_AlgoTools.IsSplitToReverse_s(as_edge(forward), as_edge(whole), context, 0)
     return forward.Reversed() if backwards else forward
 
 
 def lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
-    """Whether a face that crosses a solid's boundary nowhere lies in it."""
-    classifier.Perform(inner_point(TopoDS.Face_s(face), context), _CLASSIFYING_TOLERANCE)
+    """Tell whether a face that crosses a solid's boundary nowhere lies in it."""
+    classifier.Perform(inner_point(as_face(face), context), _CLASSIFYING_TOLERANCE)
     return bool(classifier.State() == TopAbs_IN)
 
 

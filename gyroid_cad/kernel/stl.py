@@ -20,15 +20,16 @@ from OCP.StlAPI import StlAPI_Writer
 from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.solid import TOLERANCE
 
-__all__ = ["diagonal", "meshed", "write_stl"]
+__all__ = ["diagonal", "meshed", "meshed_by_face", "write_stl"]
 
 # How far triangles that touch without belonging together are parted: a thousandth of the deviation, but
 # enough for the single-precision numbers of STL to tell them apart.
@@ -70,7 +71,7 @@ def write_stl(
 def meshed(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """The same triangles as arrays, for other formats.
+    """Triangles of a shape as arrays, for formats other than STL.
 
     They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
     Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
@@ -85,22 +86,49 @@ def meshed(
     ------
     ParameterError, ExportError
     """
+    vertices, triangles, _ = meshed_by_face(shape, path, deviation, angle)
+    return vertices, triangles
+
+
+def meshed_by_face(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+    """Triangles as :func:`meshed` makes them, and the face that each lies on, as ``TopExp_Explorer`` counts faces.
+
+    Returns
+    -------
+    vertices : ndarray of float32, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int32, shape (triangles, 3)
+    faces : ndarray of int, shape (triangles,)
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
     copy = _meshed_copy(shape, path, deviation, angle)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "triangles.stl"
         _write(copy, file, path)
         records = np.fromfile(file, _RECORD, offset=_HEADER_BYTES)
-    # Minus nought is nought.
+    # Minus zero is zero.
     corners: NDArray[np.float32] = records["corners"].reshape(-1, 3) + np.float32(0)
     vertices, numbers = np.unique(corners, axis=0, return_inverse=True)
     triangles = numbers.reshape(-1, 3).astype(np.int32)
     # What single precision makes of slivers bounds nothing.
     slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
-    return vertices, triangles[~slivers]
+    # The kernel writes them face by face.
+    counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
+    return vertices, triangles[~slivers], np.repeat(np.arange(len(counts)), counts)[~slivers]
+
+
+def _triangle_count(face: TopoDS_Shape) -> int:
+    mesh = BRep_Tool.Triangulation_s(as_face(face), TopLoc_Location())
+    return 0 if mesh is None else int(mesh.NbTriangles())
 
 
 def diagonal(shape: TopoDS_Shape) -> float:
-    """Of the box round a shape, a little larger than need be, in mm."""
+    """Diagonal of the box round a shape, a little longer than need be, in mm."""
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
     return float(box.CornerMin().Distance(box.CornerMax()))
@@ -127,11 +155,9 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     """Move mesh nodes at vertices that coincide but are not the same, each into its own faces."""
     from scipy.spatial import cKDTree
 
-    faces_of_vertex = TopTools_IndexedDataMapOfShapeListOfShape()
+    faces_of_vertex = ShapesOfShape()
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex)
-    points = [
-        BRep_Tool.Pnt_s(TopoDS.Vertex_s(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)
-    ]
+    points = [BRep_Tool.Pnt_s(as_vertex(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)]
     positions = np.array([(p.X(), p.Y(), p.Z()) for p in points])
     distance = max(
         _PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * float(np.abs(positions).max())
@@ -139,7 +165,7 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
     for vertex in touching.tolist():
         # A face used by two edges at the vertex is listed twice.
-        faces = {face.__hash__(): TopoDS.Face_s(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
+        faces = {face.__hash__(): as_face(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
         meshes = [_placed_mesh(face) for face in faces.values()]
         inward = np.mean([nodes.mean(axis=0) - positions[vertex] for _, _, nodes in meshes], axis=0)
         step = gp_Vec(*(inward * (distance / np.linalg.norm(inward))).tolist())

@@ -7,13 +7,23 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
-from OCP.gp import gp_Pnt
-from OCP.TColgp import TColgp_Array1OfPnt, TColgp_Array2OfPnt
-from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
+from OCP.Geom2d import Geom2d_Line
+from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
+from OCP.TopLoc import TopLoc_Location
 
+from gyroid_cad.kernel.compat import IntegerArray, PointArray, PointGrid, RealArray, RealGrid
 from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
+from gyroid_cad.wall.offset import Wall
 
-__all__ = ["kernel_curve", "kernel_knots", "kernel_surface", "nurbs_of_surface"]
+__all__ = [
+    "TOLERANCE",
+    "WallGeometry",
+    "kernel_curve",
+    "kernel_knots",
+    "kernel_surface",
+    "nurbs_of_surface",
+    "parameter_line",
+]
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +31,7 @@ Floats = NDArray[np.float64]
 def kernel_curve(curve: NurbsCurve) -> Geom_BSplineCurve:
     """The curve as a ``Geom_BSplineCurve``, rational only if its weights differ."""
     knots, multiplicities = kernel_knots(curve.knots)
-    poles = TColgp_Array1OfPnt(1, len(curve.control_points))
+    poles = PointArray(1, len(curve.control_points))
     for i, point in enumerate(curve.control_points.tolist(), 1):
         poles.SetValue(i, gp_Pnt(*point))
     if np.ptp(curve.weights) == 0:
@@ -32,7 +42,7 @@ def kernel_curve(curve: NurbsCurve) -> Geom_BSplineCurve:
 def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
     """The surface as a ``Geom_BSplineSurface``, rational only if its weights differ."""
     n, m = surface.weights.shape
-    poles = TColgp_Array2OfPnt(1, n, 1, m)
+    poles = PointGrid(1, n, 1, m)
     for i, row in enumerate(surface.control_points.tolist(), 1):
         for j, point in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(*point))
@@ -41,7 +51,7 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
     rest = (knots_u, knots_v, multiplicities_u, multiplicities_v, surface.degree_u, surface.degree_v)
     if not surface.rational:
         return Geom_BSplineSurface(poles, *rest)
-    weights = TColStd_Array2OfReal(1, n, 1, m)
+    weights = RealGrid(1, n, 1, m)
     for i, values in enumerate(surface.weights.tolist(), 1):
         for j, value in enumerate(values, 1):
             weights.SetValue(i, j, value)
@@ -49,7 +59,7 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
 
 
 def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
-    """What the kernel holds, read back into arrays."""
+    """Arrays of a B-spline surface that the kernel holds."""
     n, m = surface.NbUPoles(), surface.NbVPoles()
     poles = [[surface.Pole(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
     weights = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
@@ -65,23 +75,98 @@ def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
     return NurbsSurface(points, np.array(weights), knots_u, knots_v)
 
 
-def kernel_knots(vector: Floats) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+def kernel_knots(vector: Floats) -> tuple[RealArray, IntegerArray]:
     """Distinct knots and their multiplicities."""
     return _knot_arrays(tuple(vector.tolist()))
 
 
 @lru_cache(maxsize=64)
-def _knot_arrays(vector: tuple[float, ...]) -> tuple[TColStd_Array1OfReal, TColStd_Array1OfInteger]:
+def _knot_arrays(vector: tuple[float, ...]) -> tuple[RealArray, IntegerArray]:
     """Distinct knots and their multiplicities; the kernel copies them, so one pair serves all."""
     values, counts = np.unique(vector, return_counts=True)
-    multiplicities = TColStd_Array1OfInteger(1, len(counts))
+    multiplicities = IntegerArray(1, len(counts))
     for i, count in enumerate(counts.tolist(), 1):
         multiplicities.SetValue(i, count)
     return _reals(values), multiplicities
 
 
-def _reals(values: Floats) -> TColStd_Array1OfReal:
-    array = TColStd_Array1OfReal(1, len(values))
+def _reals(values: Floats) -> RealArray:
+    array = RealArray(1, len(values))
     for i, value in enumerate(values.tolist(), 1):
         array.SetValue(i, value)
     return array
+
+
+# The kernel's own smallest distance (Precision::Confusion): shared edges agree to rounding.
+TOLERANCE = 1e-7
+
+
+class WallGeometry:
+    """Curves and surfaces by patch, in the patch's own place; and the location that carries them to where they belong.
+
+    Parameters
+    ----------
+    wall : Wall
+    """
+
+    def __init__(self, wall: Wall) -> None:
+        self.wall = wall
+        # One location object a translation: the kernel compares locations by how they were made.
+        self._locations = [_translation(shift) for shift in wall.shifts.tolist()]
+        self._patch_net, self._patch_shift = wall.patch_net.tolist(), wall.patch_shift.tolist()
+        self._forward = wall.complex.edge_forward.tolist()
+        self._faces: dict[tuple[int, int], Geom_BSplineSurface] = {}
+        self._side_walls: dict[tuple[int, int], Geom_BSplineSurface] = {}
+        self._rims: dict[tuple[int, int, int, bool], Geom_BSplineCurve] = {}
+        self._borders = _border_lines()
+
+    def location(self, patch: int) -> TopLoc_Location:
+        return self._locations[self._patch_shift[patch]]
+
+    def face(self, patch: int, side: int) -> Geom_BSplineSurface:
+        """A face of the wall."""
+        key = (self._patch_net[patch], side)
+        if key not in self._faces:
+            self._faces[key] = kernel_surface(self.wall.face(*key))
+        return self._faces[key]
+
+    def side_wall(self, patch: int, k: int) -> Geom_BSplineSurface:
+        """The ruled surface through the wall along border k."""
+        key = (self._patch_net[patch], k)
+        if key not in self._side_walls:
+            self._side_walls[key] = kernel_surface(self.wall.side_wall(*key))
+        return self._side_walls[key]
+
+    def face_edge(self, patch: int, k: int, side: int) -> Geom_BSplineCurve:
+        """Border curve k of a face, run the way the complex's edge runs, on [-1, 1]."""
+        forward = self._forward[patch][k]
+        key = (self._patch_net[patch], k, side, forward)
+        if key not in self._rims:
+            curve = self.wall.face(self._patch_net[patch], side).edge(k)
+            self._rims[key] = kernel_curve(curve if forward else curve.reversed())
+        return self._rims[key]
+
+    def border(self, patch: int, k: int) -> Geom2d_Line:
+        """Border k in the parameter plane, run the way the complex's edge runs."""
+        return self._borders[k][self._forward[patch][k]]
+
+
+def parameter_line(u: float, v: float, du: float, dv: float) -> Geom2d_Line:
+    """The line in the parameter plane through (u, v) towards (du, dv)."""
+    return Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(du, dv))
+
+
+def _border_lines() -> list[tuple[Geom2d_Line, Geom2d_Line]]:
+    """The square's four sides in the parameter plane, for edges that run against and along the patch."""
+    starts = ((0, -1), (1, 0), (0, 1), (-1, 0))
+    directions = ((1, 0), (0, 1), (-1, 0), (0, -1))
+    return [
+        (parameter_line(*start, -du, -dv), parameter_line(*start, du, dv))
+        for start, (du, dv) in zip(starts, directions, strict=True)
+    ]
+
+
+def _translation(shift: list[float]) -> TopLoc_Location:
+    transformation = gp_Trsf()
+    transformation.SetTranslation(gp_Vec(*shift))
+    return TopLoc_Location(transformation)

@@ -9,33 +9,32 @@ from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.Geom import Geom_BSplineCurve, Geom_Plane
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d
-from OCP.TColgp import TColgp_Array1OfPnt2d
 from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SHELL
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
-from gyroid_cad.kernel.geometry import TOLERANCE, WallGeometry
-from gyroid_cad.kernel.surfaces import kernel_curve, kernel_knots
+from gyroid_cad.kernel.compat import Point2dArray
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
 from gyroid_cad.nurbs.surface import NurbsCurve
-from gyroid_cad.trim.box import BoxEdge, BoxedWall, BoxFace
+from gyroid_cad.trim.box import BoxEdge, BoxFace, TrimmedWall
 from gyroid_cad.trim.caps import Cap, plane_axes
 from gyroid_cad.trim.edge_crossings import PLANES
 from gyroid_cad.trim.sections import Sections, section_knots
 
-__all__ = ["hollowed_by", "realise_boxed"]
+__all__ = ["build_trimmed", "hollowed_by"]
 
 # Between what was measured between stations of a section curve and what the kernel finds elsewhere along it.
 _MARGIN = 2.0
 
 
-def realise_boxed(cut: BoxedWall) -> list[TopoDS_Shape]:
+def build_trimmed(cut: TrimmedWall) -> list[TopoDS_Shape]:
     """Build the solids of a wall cut to a box, one for each of its components; or shells, if it has no caps.
 
     Parameters
     ----------
-    cut : BoxedWall
+    cut : TrimmedWall
 
     Raises
     ------
@@ -62,7 +61,7 @@ def hollowed_by(solid: TopoDS_Shape, voids: Iterable[TopoDS_Shape]) -> TopoDS_So
 
 
 class _Realisation:
-    def __init__(self, cut: BoxedWall) -> None:
+    def __init__(self, cut: TrimmedWall) -> None:
         self.cut = cut
         self.builder = BRep_Builder()
         self.geometry = WallGeometry(cut.wall)
@@ -101,7 +100,10 @@ class _Realisation:
         if edge.patch < 0:
             curve, location, tolerance = self._straight(edge), self.identity, TOLERANCE
         elif edge.sections is None:
-            curve, location = self.geometry.rim(edge.patch, edge.rim, edge.side), self.geometry.location(edge.patch)
+            curve, location = (
+                self.geometry.face_edge(edge.patch, edge.patch_edge, edge.side),
+                self.geometry.location(edge.patch),
+            )
             tolerance = TOLERANCE
         else:
             curve, _, tolerance = self._section(edge.sections, edge.curve)
@@ -128,7 +130,7 @@ class _Realisation:
             parameters = sections.parameters[curve]
             points = sections.points[curve] @ self.cut.box.axes.T
             knots = section_knots(len(points))
-            poles = TColgp_Array1OfPnt2d(1, len(parameters))
+            poles = Point2dArray(1, len(parameters))
             for index, place in enumerate(parameters.tolist(), 1):
                 poles.SetValue(index, gp_Pnt2d(*place))
             self.curves[key] = (
@@ -142,16 +144,18 @@ class _Realisation:
         surface, location = self.geometry.face(face.patch, face.side), self.geometry.location(face.patch)
         made = TopoDS_Face()
         self.builder.MakeFace(made, surface, location, TOLERANCE)
-        for loop, rims in zip(face.loops, face.rims, strict=True):
-            for (number, _), rim in zip(loop, rims, strict=True):
+        for loop, patch_edges in zip(face.loops, face.patch_edges, strict=True):
+            for (number, _), patch_edge in zip(loop, patch_edges, strict=True):
                 sections, curve = self.cut.edges[number].sections, self.cut.edges[number].curve
                 if sections is None:
-                    line, tolerance = self.geometry.border(face.patch, rim), TOLERANCE
+                    line, tolerance = self.geometry.border(face.patch, patch_edge), TOLERANCE
                 else:
                     _, line, tolerance = self._section(sections, curve)
                 self.builder.UpdateEdge(self.edges[number], line, surface, location, tolerance)
             self.builder.Add(made, self._wire(loop))
-        self.builder.NaturalRestriction(made, all(rim >= 0 for rims in face.rims for rim in rims))
+        self.builder.NaturalRestriction(
+            made, all(patch_edge >= 0 for patch_edges in face.patch_edges for patch_edge in patch_edges)
+        )
         return made.Oriented(TopAbs_REVERSED) if face.backwards else made
 
     def _cap(self, cap: Cap) -> TopoDS_Face:

@@ -1,7 +1,7 @@
 """Maps of space: a lattice is laid out in its own flat space, in mm, and then carried to where it is wanted.
 
 A map is a function of (x, y, z) with its Jacobian. Normals turn with the Jacobian's cofactors, so the wall can
-be laid off along the normal of the surface as mapped. Arrays here are component first, (3, n): every
+be offset along the normal of the surface as mapped. Arrays here are component first, (3, n): every
 component is then contiguous.
 """
 
@@ -77,7 +77,7 @@ class SpaceMap:
         object.__setattr__(self, "closed", tuple(self.closed))
 
     def over(self, size: Size) -> SpaceMap:
-        """The same map, whatever the block."""
+        """Return the map itself, whatever the block."""
         return self
 
     def __str__(self) -> str:
@@ -85,7 +85,7 @@ class SpaceMap:
 
 
 def carried(parameter: str, space: SpaceMap, points: Floats, step: float) -> tuple[Floats, Floats]:
-    """Where a map carries points, and its Jacobian there.
+    """Carry points by a map, and give its Jacobian there.
 
     Parameters
     ----------
@@ -110,12 +110,12 @@ def carried(parameter: str, space: SpaceMap, points: Floats, step: float) -> tup
     """
 
     def images(places: Floats) -> Floats:
-        return _components(parameter, space, _asked(parameter, space, space.function, places), places, (3,))
+        return _components(parameter, space, _requested(parameter, space, space.function, places), places, (3,))
 
     moved = images(points)
     if space.jacobian is None:
         return moved, differences(images, points, step)
-    jacobian = _components(parameter, space, _asked(parameter, space, space.jacobian, points), points, (3, 3))
+    jacobian = _components(parameter, space, _requested(parameter, space, space.jacobian, points), points, (3, 3))
     few = slice(None, None, max(1, points.shape[1] // _COMPARED_POINTS))
     measured = differences(images, points[:, few], step)
     if not np.abs(jacobian[..., few] - measured).max() <= _JACOBIAN_AGREEMENT * np.abs(measured).max():
@@ -150,7 +150,7 @@ def differences(function: Callable[[Floats], Floats], points: Floats, step: floa
     return np.stack([along(axis) for axis in range(3)], axis=-2)
 
 
-def _asked(parameter: str, space: SpaceMap, function: Callable[..., Any], points: Floats) -> Any:
+def _requested(parameter: str, space: SpaceMap, function: Callable[..., Any], points: Floats) -> Any:
     try:
         return function(*points.copy())
     except Exception as problem:
@@ -159,7 +159,7 @@ def _asked(parameter: str, space: SpaceMap, function: Callable[..., Any], points
 
 
 def _components(parameter: str, space: SpaceMap, given: Any, points: Floats, shape: tuple[int, ...]) -> Floats:
-    """What a map gave, as one array (*shape, n), if it is what a map should give."""
+    """Values of a map as one array (*shape, n), if they are what a map should give."""
     wanted = f"{' x '.join(map(str, shape))} real arrays of shape {points[0].shape} or numbers"
     result = np.empty((*shape, points.shape[1]))
     try:

@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from gyroid_cad.nurbs.surface import edge_row
 from gyroid_cad.wall.complex import CellComplex
 
-__all__ = ["FACE_A", "FACE_B", "FREE_WALLS", "patch_places", "place_count"]
+__all__ = ["FACE_A", "FACE_B", "FREE_WALLS", "patch_nodes", "place_count"]
 
 Integers = NDArray[np.int64]
 
-# Of the wall: A faces the labyrinth that the common normal points to, B the other; free walls close the lattice's rim.
+# Of the wall: A faces the network that the common normal points to, B the other; free walls close the lattice's rim.
 FACE_A, FACE_B, FREE_WALLS = "FACE_A", "FACE_B", "FREE_WALLS"
 
 
 def place_count(complex: CellComplex, steps: int) -> int:
-    """How many places there are with so many steps along each side of a patch."""
+    """Count the nodes with so many steps along each side of a patch."""
     inner = steps - 1
     return complex.fan_count + complex.edge_count * inner + complex.patch_count * inner**2
 
 
-def patch_places(complex: CellComplex, steps: int, patches: slice = slice(None)) -> Integers:
+def patch_nodes(complex: CellComplex, steps: int, patches: slice = slice(None)) -> Integers:
     """Numbers of the places of patches.
 
     Parameters

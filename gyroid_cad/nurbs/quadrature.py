@@ -83,7 +83,7 @@ class SquareQuadrature:
         return np.asarray(np.einsum("m,mq,mqk->k", rates, at, along_u))
 
     def _functions(self, x: Floats) -> tuple[Integers, Floats, Floats]:
-        """Which span x is in; there Lagrange's polynomials on its nodes, and their integrals from its start to x."""
+        """Span of each x; there Lagrange's polynomials on its nodes, and their integrals from its start to x."""
         span = np.clip(np.searchsorted(self.breaks, x, side="right") - 1, 0, len(self.breaks) - 2)
         half = np.diff(self.breaks)[span] / 2
         local = (x - self.breaks[span]) / half - 1

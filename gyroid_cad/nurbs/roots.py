@@ -22,7 +22,7 @@ _HIDDEN = 1 / 4
 def roots(
     samples: Floats, values: Floats, at: Callable[[Integers, Floats], tuple[Floats, Floats]]
 ) -> tuple[Integers, Floats]:
-    """Where functions change sign.
+    """Find the places where functions change sign.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def roots(
 def _turns(
     samples: Floats, values: Floats, at: Callable[[Integers, Floats], tuple[Floats, Floats]]
 ) -> tuple[Integers, Integers, Floats, Floats]:
-    """Which functions turn back beyond zero between two samples, the one before, where that is, and the value there."""
+    """Functions that turn back beyond zero between two samples: the sample before, the place, and the value there."""
     here = values[:, 1:-1]
     with np.errstate(invalid="ignore"):
         bend = values[:, :-2] - 2 * here + values[:, 2:]

@@ -134,7 +134,7 @@ class NurbsCurve:
         return np.asarray(functions @ self.control_points / functions.sum(axis=1, keepdims=True))
 
     def reversed(self) -> NurbsCurve:
-        """The same curve run backwards on the same domain."""
+        """Curve run backwards on the same domain."""
         flipped = self.knots[0] + self.knots[-1] - self.knots[::-1]
         return NurbsCurve(self.control_points[::-1], self.weights[::-1], flipped)
 
@@ -173,7 +173,7 @@ class NurbsSurface:
 
     @property
     def rational(self) -> bool:
-        """Whether the weights differ, so that the surface is not polynomial."""
+        """True where the weights differ, so that the surface is not polynomial."""
         return bool(np.ptp(self.weights) > 0)
 
     def evaluate(self, u: ArrayLike, v: ArrayLike) -> Floats:
@@ -334,7 +334,7 @@ def _homogeneous(control_points: Floats, weights: Floats) -> Floats:
 
 
 def _quotient(numerator: Floats, order: int) -> Floats:
-    """From derivatives of (wS, w) to derivatives of S, by the product rule on wS = w * S."""
+    """Derivatives of S from those of (wS, w), by the product rule on wS = w * S."""
     result = np.zeros((*numerator.shape[:-1], 3))
     weight = numerator[..., 3:]
     result[0, 0] = numerator[0, 0, :, :3] / weight[0, 0]

@@ -129,7 +129,7 @@ class NurbsVolume:
 
 
 def _open_grid(given: list[Floats], shape: tuple[int, ...]) -> bool:
-    """Whether parameters are a grid given open: (a, 1, 1), (1, b, 1) and (1, 1, c)."""
+    """Tell whether parameters are a grid given open: (a, 1, 1), (1, b, 1) and (1, 1, c)."""
     if len(shape) != 3:
         return False
     wanted = ((shape[0], 1, 1), (1, shape[1], 1), (1, 1, shape[2]))

@@ -1,4 +1,4 @@
-"""Whether a printer can make a part: does it fit, are its walls thick enough, does resin drain, is it one piece."""
+"""Check of a part against a printer: does it fit, are its walls thick enough, does resin drain, is it one piece."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.shells import Shells, shells_of
-from gyroid_cad.mesh.triangles.wall_thickness import measured_walls
+from gyroid_cad.mesh.triangles.measures import TriangleMeasures, measured_walls, triangle_measures
 from gyroid_cad.printing.printers import Printer, printer_named
-from gyroid_cad.wall.complex import CellComplex, connected
-from gyroid_cad.wall.pore_limits import narrowest_opening, throat_diameter
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.pore_limits import narrowest_opening, pore_limiting_diameter
 
 __all__ = ["PrintCheck", "print_check", "trapped_voids"]
 
@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PrintCheck:
-    """What a printer makes of a part; lengths in mm.
+    """Verdict on a part for a printer; lengths in mm.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class PrintCheck:
         if it fits in no way along the axes.
     scale_to_fit : float
         The largest scale at which it fits: below 1 it must be made smaller.
-    smallest_wall : float, optional
+    min_wall : float, optional
         None where none was found.
     walls_measured : int
         At how many places; 0 if it is known from the lattice's description.
@@ -54,7 +54,7 @@ class PrintCheck:
     trapped_voids : int
         Regions of empty space that do not reach outside.
     pieces : int
-        That hang together by no edge.
+        That are connected by no edge.
     open_edges, inside_out : int
         Of triangles: edges not closed, and pieces turned inside out.
     triangles : int
@@ -65,7 +65,7 @@ class PrintCheck:
     size: tuple[float, float, float]
     orientation: tuple[int, int, int] | None
     scale_to_fit: float
-    smallest_wall: float | None
+    min_wall: float | None
     walls_measured: int
     scale_for_supported_wall: float | None
     scale_for_wall: float | None
@@ -79,22 +79,22 @@ class PrintCheck:
 
     @property
     def fits(self) -> bool:
-        """Whether it fits the build volume, its axes along the printer's in one order or another."""
+        """True if it fits the build volume, its axes along the printer's in one order or another."""
         return self.orientation is not None
 
     @property
     def wall(self) -> str:
         """ "good", "supported only" where it passes joined to others but not free, "too thin", or "unknown"."""
-        if self.smallest_wall is None:
+        if self.min_wall is None:
             return "unknown"
-        if self.smallest_wall >= self.printer.smallest_unsupported_wall:
+        if self.min_wall >= self.printer.min_unsupported_wall:
             return "good"
-        return "supported only" if self.smallest_wall >= self.printer.smallest_supported_wall else "too thin"
+        return "supported only" if self.min_wall >= self.printer.min_supported_wall else "too thin"
 
     @property
     def drains(self) -> bool | None:
-        """Whether channels are as wide as a drain hole is to be; None if that is not known."""
-        return None if self.opening is None else self.opening >= self.printer.smallest_drain_hole
+        """True if channels are as wide as a drain hole is to be; None if that is not known."""
+        return None if self.opening is None else self.opening >= self.printer.min_drain_hole
 
     @property
     def suggested_scale(self) -> float | None:
@@ -104,7 +104,7 @@ class PrintCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing stands in the way; narrow channels, free edges and loose pieces are the user's to judge."""
+        """Absence of anything that stands in the way; narrow channels and boundary edges are the user's to judge."""
         sound = self.trapped_voids == 0 and self.open_edges == 0 and self.inside_out == 0
         return self.fits and self.wall != "too thin" and sound
 
@@ -128,18 +128,18 @@ class PrintCheck:
         return "build volume", finding, f"fits with its {order} along the printer's x, y, z"
 
     def _wall_row(self) -> tuple[str, str, str]:
-        limits = self.printer.smallest_supported_wall, self.printer.smallest_unsupported_wall
-        asked = f"asked {limits[0]:g} mm supported, {limits[1]:g} mm free"
-        if self.smallest_wall is None:
-            return "smallest wall", f"none found; {asked}", "unknown"
+        limits = self.printer.min_supported_wall, self.printer.min_unsupported_wall
+        requested = f"asked {limits[0]:g} mm supported, {limits[1]:g} mm free"
+        if self.min_wall is None:
+            return "smallest wall", f"none found; {requested}", "unknown"
         how = f" at {self.walls_measured:,} places" if self.walls_measured else ""
         verdict = {
             "good": "good",
-            "supported only": f"good but at free edges; from a scale of {_rounded_up(self.scale_for_wall)} there too",
+            "supported only": f"good but at boundary edges; there from a scale of {_rounded_up(self.scale_for_wall)}",
             "too thin": f"too thin: passes from a scale of {_rounded_up(self.scale_for_supported_wall)}, "
-            f"free edges from {_rounded_up(self.scale_for_wall)}",
+            f"boundary edges from {_rounded_up(self.scale_for_wall)}",
         }[self.wall]
-        return "smallest wall", f"{self.smallest_wall:.4g} mm{how}; {asked}", verdict
+        return "smallest wall", f"{self.min_wall:.4g} mm{how}; {requested}", verdict
 
     def _drain_rows(self) -> list[tuple[str, str, str]]:
         voids = "none" if self.trapped_voids == 0 else f"{self.trapped_voids}: resin cannot leave"
@@ -154,7 +154,7 @@ class PrintCheck:
 
     @property
     def _hole(self) -> float:
-        return self.printer.smallest_drain_hole
+        return self.printer.min_drain_hole
 
     def _whole_rows(self) -> list[tuple[str, str, str]]:
         closed = "closed" if not self.open_edges else f"{self.open_edges:,} open edges"
@@ -177,7 +177,7 @@ def print_check(
 
     Of a lattice the smallest wall is known, and the channels' opening is worked out from the exact surface. Of
     triangles the walls are measured through them, straight from one side to one that faces away, at some thousands of
-    places. Pieces are what hangs together; layers that begin in mid-air, which depend on how the part is turned, are
+    places. Pieces are what is connected; layers that begin in mid-air, which depend on how the part is turned, are
     for the printer's own program to find.
 
     Parameters
@@ -208,36 +208,36 @@ def print_check(
         vertices, triangles = read_triangles(part)
     else:
         raise ParameterError("part", part, "a Lattice, an STL or 3MF file, or arrays of vertices and triangles")
-    shells = shells_of(vertices, triangles)
+    found = triangle_measures(vertices, triangles)
     walls = measured_walls(vertices, triangles, _WALLS_MEASURED)
     smallest = float(walls[0]) if len(walls) else None
-    return _checked(chosen, shells.high - shells.low, smallest, len(walls), None, shells)
+    return _checked(chosen, found.high - found.low, smallest, len(walls), None, found)
 
 
 def _check_lattice(
     lattice: Lattice, printer: Printer, deviation: float | None, progress: Progress | None
 ) -> PrintCheck:
-    laid = lattice.laid(progress)
-    grading = laid.recipe.grading
+    fitted = lattice.fitted(progress)
+    grading = fitted.spec.grading
     opening = (
-        throat_diameter(grading.surface, grading.cell_size, laid.thinnest)
+        pore_limiting_diameter(grading.surface, grading.cell_size, fitted.min_thickness)
         if grading.uniform
-        else narrowest_opening(laid.wall, grading, lattice.cells)
+        else narrowest_opening(fitted.wall, grading, lattice.cells)
     )
-    if laid.recipe.boxed:
+    if fitted.spec.trimmed:
         from gyroid_cad.kernel.stl import meshed
 
-        limit = min(lattice.cell_size / 1000, laid.thinnest / 10) if deviation is None else deviation
-        shells = shells_of(*meshed(lattice.solid(progress), "triangles", limit))
-        return _checked(printer, shells.high - shells.low, laid.thinnest, 0, opening, shells)
-    low, high = laid.bounding_box()
+        limit = min(lattice.cell_size / 1000, fitted.min_thickness / 10) if deviation is None else deviation
+        found = triangle_measures(*meshed(lattice.solid(progress), "triangles", limit))
+        return _checked(printer, found.high - found.low, fitted.min_thickness, 0, opening, found)
+    low, high = fitted.bounding_box()
     count = lattice.triangles(deviation, progress).triangulation.triangle_count
-    voids, pieces = trapped_voids(laid.complex), laid.complex.component_count
-    return _checked(printer, high - low, laid.thinnest, 0, opening, (voids, pieces, count))
+    voids, pieces = trapped_voids(fitted.complex), fitted.complex.component_count
+    return _checked(printer, high - low, fitted.min_thickness, 0, opening, (voids, pieces, count))
 
 
 def trapped_voids(complex: CellComplex) -> int:
-    """How many regions of empty space within a lattice of whole patches do not reach outside.
+    """Count the regions of empty space within a lattice of whole patches that do not reach outside.
 
     The wall's surface falls into shells: both faces of every patch, joined across shared edges on either side and,
     where an edge is free, to each other by its side wall. Every piece of the lattice has one shell outside; each
@@ -254,31 +254,31 @@ def trapped_voids(complex: CellComplex) -> int:
 def _checked(
     printer: Printer,
     extents: NDArray[np.float64],
-    smallest_wall: float | None,
+    min_wall: float | None,
     walls_measured: int,
     opening: float | None,
-    found: Shells | tuple[int, int, int],
+    found: TriangleMeasures | tuple[int, int, int],
 ) -> PrintCheck:
     x, y, z = extents.tolist()
     volume = np.array(printer.build_volume)
     scales = {order: float(np.min(volume / extents[list(order)])) for order in permutations(range(3))}
     # As it stands, if it fits so.
     fitting = next((order for order, scale in scales.items() if scale >= 1 - _ROUNDING), None)
-    if isinstance(found, Shells):
-        counts = found.trapped_voids, found.pieces, found.open_edges, found.inside_out, int(found.triangles.sum())
+    if isinstance(found, TriangleMeasures):
+        counts = found.trapped_voids, found.pieces, found.open_edges, found.inside_out, found.triangles
     else:
         voids, pieces, triangles = found
         counts = voids, pieces, 0, 0, triangles
-    wall = smallest_wall
+    wall = min_wall
     return PrintCheck(
         printer=printer,
         size=(x, y, z),
         orientation=None if fitting is None else (fitting[0], fitting[1], fitting[2]),
         scale_to_fit=max(scales.values()),
-        smallest_wall=wall,
+        min_wall=wall,
         walls_measured=walls_measured,
-        scale_for_supported_wall=None if wall is None else printer.smallest_supported_wall / wall,
-        scale_for_wall=None if wall is None else printer.smallest_unsupported_wall / wall,
+        scale_for_supported_wall=None if wall is None else printer.min_supported_wall / wall,
+        scale_for_wall=None if wall is None else printer.min_unsupported_wall / wall,
         opening=opening,
         trapped_voids=counts[0],
         pieces=counts[1],

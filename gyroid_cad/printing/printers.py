@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from gyroid_cad.common.checks import finite_numbers, positive_number
+from gyroid_cad.common.inputs import read_toml
 from gyroid_cad.errors import ParameterError
 
 __all__ = ["Printer", "printer_named", "printers"]
 
 _ENDING = ".toml"
 _LENGTH = "a length in mm, a finite number above 0"
-_LARGEST_FILE = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Printer:
-    """What a printer asks of a part; lengths in mm.
+    """A printer's demands on a part; lengths in mm.
 
     Attributes
     ----------
@@ -31,11 +29,11 @@ class Printer:
     name, process : str
     build_volume : tuple of float
         Along its own three axes.
-    smallest_supported_wall : float
+    min_supported_wall : float
         Of walls that are joined to others on two sides or more.
-    smallest_unsupported_wall : float
+    min_unsupported_wall : float
         Of walls that stand free at an edge.
-    smallest_drain_hole : float
+    min_drain_hole : float
         Diameter.
     """
 
@@ -43,9 +41,9 @@ class Printer:
     name: str
     process: str
     build_volume: tuple[float, float, float]
-    smallest_supported_wall: float
-    smallest_unsupported_wall: float
-    smallest_drain_hole: float
+    min_supported_wall: float
+    min_unsupported_wall: float
+    min_drain_hole: float
 
 
 _KEYS = tuple(field.name for field in fields(Printer) if field.name != "key")
@@ -76,23 +74,10 @@ def printer_named(given: str) -> Printer:
         return known[str(given)]
     if not str(given).lower().endswith(_ENDING):
         raise ParameterError("printer", str(given), f"{', '.join(known)}, or the path of a {_ENDING} file of your own")
-    with _readable(str(given)):
-        if Path(given).stat().st_size > _LARGEST_FILE:
-            raise ParameterError("printer", str(given), f"a TOML file of at most {_LARGEST_FILE:,} bytes")
-        own = _described(tomllib.loads(Path(given).read_text(encoding="utf-8")), str(given))
+    own = _described(read_toml("printer", given)[0], str(given))
     if len(own) != 1:
         raise ParameterError("printer", str(given), f"a file with one table, of one printer; it has {len(own)}")
     return next(iter(own.values()))
-
-
-@contextmanager
-def _readable(path: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as problem:
-        raise ParameterError("printer", path, f"a TOML file that can be read: {problem.strerror}") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as problem:
-        raise ParameterError("printer", path, f"TOML: {problem}") from None
 
 
 def _described(tables: Mapping[str, Any], path: str) -> dict[str, Printer]:

@@ -1,187 +1,188 @@
-"""Pictures of triangles: a z-buffer in numpy, written as PNG. No display, no graphics library, no kernel."""
+"""Pictures of triangles: soft light, fine lines where faces meet, dark ones along edges and outlines.
+
+Orthographic, and all in numpy: no display, driver, viewer or kernel is needed. Edges are found in the picture itself,
+where neighbouring samples see different things (T. Saito and T. Takahashi, *Comprehensible rendering of 3-D shapes*,
+1990).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.common.arrays import dot
+from gyroid_cad.render.facets import Facets
+from gyroid_cad.render.picture import CAMERA, SIZE, Vector, view_axes
+from gyroid_cad.render.raster import NOTHING, nearest_triangles, slopes
 
-__all__ = ["VIEWS", "Facets", "View", "drawn"]
+__all__ = ["draw", "snug_size"]
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 Integers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
-# Pixels are drawn so many times finer, along both sides, and averaged.
-_FINER = 2
-_FRAGMENTS_AT_ONCE = 100_000
-# Part of the picture left free round what is drawn.
-_MARGIN = 0.03
-# Light: from the viewer's upper left, and some from everywhere.
-_LIGHT = np.array([-0.35, 0.5, 0.8]) / np.linalg.norm([-0.35, 0.5, 0.8])
-_AMBIENT, _DIFFUSE = 0.5, 0.56
-_NO_LENGTH = 1e-30
+# Of the picture's smaller side, left free on all sides.
+_MARGIN = 0.02
+# Each pixel is the mean of so many samples squared.
+_FINER = 3
+# PNG files of colours in steps too small to be seen are a third smaller; 255 is a multiple of it.
+_COLOUR_STEP = 3
+# Samples in one go, so that large pictures take no more memory than these: about 500 MB.
+_AT_ONCE = 6_000_000
+# Light from everywhere, from the sky, and from a lamp over the viewer's left shoulder (right, up, towards the viewer).
+_AMBIENT, _SKY, _LAMP = 0.5, 0.18, 0.42
+_DIRECTION = np.array([-0.45, 0.6, 0.66]) / np.linalg.norm([-0.45, 0.6, 0.66])
+# How much darker a sample is on an outline or a sharp edge, beside it, and where two faces meet smoothly.
+_EDGE, _BESIDE, _SMOOTH = 0.75, 0.4, 0.25
+# Cosine of the angle between neighbouring triangles from which on an edge is sharp.
+_SHARP = 0.82
+# Of depth between neighbouring samples, above what their triangles' slopes explain, in samples.
+_JUMP = 2.0
+# In parts of the length of what is drawn: its width, at least.
+_THINNEST = 1e-6
+_NO_LENGTH = float(np.finfo(float).tiny)
 
 
-@dataclass(frozen=True, slots=True)
-class View:
-    """From where a picture is taken, without perspective.
-
-    Attributes
-    ----------
-    name : str
-    towards : tuple of float
-        Direction from what is drawn to the viewer.
-    up : tuple of float
-        What is upright in the picture.
-    """
-
-    name: str
-    towards: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-
-    @property
-    def axes(self) -> Floats:
-        """Unit vectors to the picture's right, up it and to the viewer, as rows."""
-        towards = np.array(self.towards) / np.linalg.norm(self.towards)
-        right = np.cross(self.up, towards)
-        right /= np.linalg.norm(right)
-        return np.stack([right, np.cross(towards, right), towards])
-
-
-VIEWS = (
-    View("from the corner", (3.0, -4.0, 2.6)),
-    View("from the front, along y", (0.0, -1.0, 0.0)),
-    View("from the right, along x", (1.0, 0.0, 0.0)),
-    View("from above, along z", (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Facets:
-    """Coloured triangles.
-
-    Attributes
-    ----------
-    corners : ndarray, shape (n, 3, 3)
-        By triangle, corner and coordinate, in mm.
-    normals : ndarray, shape (n, 3, 3)
-        At the corners, out of the solid; of any length but nought.
-    colours : ndarray, shape (n, 3)
-        Red, green and blue from 0 to 1.
-    closed : bool
-        Whether they bound solids, counterclockwise seen from outside: then none is ever seen from behind.
-    """
-
-    corners: Floats
-    normals: Floats
-    colours: Floats
-    closed: bool
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
-
-def drawn(facets: Facets, view: View, size: int) -> Bytes:
-    """Draw triangles.
+def draw(facets: Facets, size: tuple[int, int] = SIZE, camera: Vector = CAMERA) -> Bytes:
+    """Draw triangles, seen from afar, as large as the picture lets them be.
 
     Parameters
     ----------
     facets : Facets
-    view : View
-    size : int
-        Of the longer side of the picture, in pixels.
+    size : tuple of int
+        Width and height in pixels.
+    camera : tuple of float
+        Direction to the viewer; z points up in the picture.
 
     Returns
     -------
     ndarray of uint8, shape (height, width, 4)
-        Red, green, blue and how opaque; nothing is behind the triangles.
+        Red, green, blue and opacity; what is behind the triangles shows through.
+
+    Examples
+    --------
+    >>> from gyroid_cad.render.facets import facets_of_triangles
+    >>> square = facets_of_triangles([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], closed=False)
+    >>> image = draw(square, (100, 100), camera=(0, 0, 1))
+    >>> image.shape, int((image[..., 3] == 255).sum())
+    ((100, 100, 4), 9216)
     """
-    points = facets.corners @ view.axes.T
-    low, high = (reach(points.reshape(-1, 3), axis=0)[:2] for reach in (np.min, np.max))
-    scale = _FINER * size * (1 - 2 * _MARGIN) / float(np.max(high - low))
-    margin = _MARGIN * size * _FINER
-    width, height = (_FINER * int(np.ceil(x)) for x in ((high - low) * scale + 2 * margin) / _FINER)
-    placed = np.empty_like(points)
-    placed[..., 0] = (points[..., 0] - low[0]) * scale + margin
-    placed[..., 1] = (high[1] - points[..., 1]) * scale + margin
-    placed[..., 2] = points[..., 2]
-    depths = np.full(width * height, -np.inf)
-    owners = np.zeros(width * height, dtype=np.int64)
-    portions = np.zeros((width * height, 3))
-    for pixels, depth, which, shares in _fragments(placed, facets.closed, width, height):
-        nearer = np.flatnonzero(depth > depths[pixels])
-        # Of fragments in one pixel the nearest is to be written last.
-        nearer = nearer[np.argsort(depth[nearer], kind="stable")]
-        seen = pixels[nearer]
-        depths[seen], owners[seen], portions[seen] = depth[nearer], which[nearer], shares[nearer]
-    covered = np.isfinite(depths)
-    shades = np.zeros((width * height, 3))
-    shades[covered] = _shaded(facets, owners[covered], portions[covered], view)
-    return _averaged(shades, covered, width, height)
+    width, height = (_FINER * length for length in size)
+    scene = _scene(facets, view_axes(camera), width, height)
+    rows = max(_AT_ONCE // (_FINER * width), 1)
+    return np.concatenate([_band(scene, size, top, min(top + rows, size[1])) for top in range(0, size[1], rows)])
 
 
-def _shaded(facets: Facets, which: Integers, shares: Floats, view: View) -> Floats:
-    """Colours at places of triangles, lit."""
-    normal = np.einsum("nk,nkc->nc", shares, facets.normals[which]) @ view.axes.T
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), _NO_LENGTH)
-    # What is seen from behind, in a surface that is not closed, is lit too.
-    normal *= np.where(normal[:, 2:] < 0, -1.0, 1.0)
-    light = _AMBIENT + _DIFFUSE * np.maximum(dot(normal, _LIGHT), 0.0)
-    return np.minimum(facets.colours[which] * light[:, np.newaxis], 1.0)
+def snug_size(facets: Facets, camera: Vector, longest: int) -> tuple[int, int]:
+    """Width and height of a picture that triangles just fill, in pixels.
+
+    Parameters
+    ----------
+    facets : Facets
+    camera : tuple of float
+    longest : int
+        The longer of the two.
+    """
+    extent = np.ptp((facets.corners @ view_axes(camera)[:2].T).reshape(-1, 2), axis=0)
+    usable = longest * (1 - 2 * _MARGIN)
+    shorter = usable * float(extent.min()) / (float(extent.max()) or 1.0)
+    # The margin is a part of the shorter side.
+    other = max(int(np.ceil(shorter / (1 - 2 * _MARGIN))), 1)
+    return (longest, other) if extent[0] >= extent[1] else (other, longest)
 
 
-def _fragments(
-    placed: Floats, closed: bool, width: int, height: int
-) -> Iterator[tuple[Integers, Floats, Integers, Floats]]:
-    """Pixels that triangles cover: number of pixel, depth, triangle, and shares of its three corners."""
-    low = np.floor(placed[..., :2].min(axis=1) - 0.5).astype(np.int64).clip(0)
-    high = np.ceil(placed[..., :2].max(axis=1) - 0.5).astype(np.int64)
-    high = np.minimum(high, [width - 1, height - 1])
-    extent = high - low + 1
-    a, b, c = (placed[:, k, :2] for k in range(3))
-    twice = _cross(b - a, c - a)
-    # Down the picture is the other way round. Of closed surfaces the back is never seen.
-    facing = twice < 0 if closed else twice != 0
-    seen = np.flatnonzero(facing & np.all(extent > 0, axis=1))
-    # Triangles whose boxes are about as large, to an eighth, go together.
-    unit = 2 ** np.maximum(np.floor(np.log2(np.maximum(extent[seen], 1))).astype(np.int64) - 3, 0)
-    boxes = -(-extent[seen] // unit) * unit
-    kinds, which_kind = np.unique(boxes, axis=0, return_inverse=True)
-    in_order = seen[np.argsort(which_kind.ravel(), kind="stable")]
-    ends = np.cumsum(np.bincount(which_kind.ravel(), minlength=len(kinds)))
-    for (columns, rows), members in zip(kinds.tolist(), np.split(in_order, ends[:-1]), strict=True):
-        step = max(1, _FRAGMENTS_AT_ONCE // (columns * rows))
-        for first in range(0, len(members), step):
-            some = members[first : first + step]
-            x = low[some, 0, np.newaxis, np.newaxis] + np.arange(columns)[np.newaxis, np.newaxis]
-            y = low[some, 1, np.newaxis, np.newaxis] + np.arange(rows)[np.newaxis, :, np.newaxis]
-            px, py = x + 0.5, y + 0.5
-            corner = [(placed[some, k, 0, None, None], placed[some, k, 1, None, None]) for k in range(3)]
-            area = twice[some, np.newaxis, np.newaxis]
-            shares = [
-                ((corner[k][0] - px) * (corner[m][1] - py) - (corner[k][1] - py) * (corner[m][0] - px)) / area
-                for k, m in ((1, 2), (2, 0), (0, 1))
-            ]
-            inside = (shares[0] >= 0) & (shares[1] >= 0) & (shares[2] >= 0) & (x < width) & (y < height)
-            which, row, column = np.nonzero(inside)
-            weights = np.stack([share[which, row, column] for share in shares], axis=1)
-            triangle = some[which]
-            depth = np.sum(weights * placed[triangle, :, 2], axis=1)
-            yield (low[triangle, 1] + row) * width + low[triangle, 0] + column, depth, triangle, weights
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scene:
+    """Triangles that may be seen.
+
+    Attributes
+    ----------
+    corners : ndarray, shape (n, 3, 3)
+        In samples: to the right, down, and towards the viewer.
+    flat : ndarray, shape (n, 3)
+        Unit normals towards the viewer.
+    colours : ndarray, shape (n, 3, 3)
+        At the corners, lit.
+    faces : ndarray of int, shape (n,)
+    """
+
+    corners: Floats
+    flat: Floats
+    colours: Floats
+    faces: Integers
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+def _scene(facets: Facets, axes: Floats, width: int, height: int) -> _Scene:
+    seen = facets.corners @ axes.T
+    flat = _unit(np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0]))
+    low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
+    usable = np.array([width, height]) - 2 * _MARGIN * min(width, height)
+    # A line or a point fills nothing.
+    least = _THINNEST * float(np.max(high - low)) or 1.0
+    scale = float(np.min(usable / np.maximum(high - low, least)[:2]))
+    # Nobody sees closed surfaces from behind.
+    kept = flat[:, 2] > 0 if facets.closed else flat[:, 2] != 0
+    flat, seen = flat[kept], seen[kept]
+    # Others are lit on the side that is seen.
+    turned = np.where(flat[:, 2] < 0, -1.0, 1.0)[:, np.newaxis]
+    normals = _unit(facets.normals[kept] @ axes.T) * turned[:, np.newaxis]
+    light = _AMBIENT + _SKY * (1 + normals[..., 1]) / 2 + _LAMP * np.maximum(dot(normals, _DIRECTION), 0)
+    corners = (seen - (low + high) / 2) * (scale, -scale, scale) + (width / 2, height / 2, 0)
+    return _Scene(corners, flat * turned, facets.colours[kept] * light[..., np.newaxis], facets.faces[kept])
 
 
-def _averaged(shades: Floats, covered: NDArray[np.bool_], width: int, height: int) -> Bytes:
-    blocks = (height // _FINER, _FINER, width // _FINER, _FINER)
-    opaque = covered.reshape(blocks).mean(axis=(1, 3))
-    colour = shades.reshape(*blocks, 3).sum(axis=(1, 3)) / np.maximum(opaque * _FINER**2, 1)[..., np.newaxis]
-    picture = np.concatenate([colour, opaque[..., np.newaxis]], axis=-1)
-    return np.asarray(np.round(picture * 255), dtype=np.uint8)
+def _band(scene: _Scene, size: tuple[int, int], top: int, bottom: int) -> Bytes:
+    """Rows of pixels of a picture, from one to another."""
+    width = _FINER * size[0]
+    # With a pixel above and below, for the lines that come from there.
+    height, above = _FINER * (bottom - top + 2), _FINER * (top - 1)
+    scene = replace(scene, corners=scene.corners - (0, above, 0))
+    seen = nearest_triangles(scene.corners, width, height)
+    hit = np.flatnonzero(seen != NOTHING)
+    row, column = np.divmod(hit, width)
+    colours = slopes(scene.corners, scene.colours).at(seen[hit], column, row)
+    fine = np.zeros((width * height, 4), dtype=np.float32)
+    fine[hit, :3] = np.clip(colours, 0, 1) * (1 - _ink(scene, seen, hit, width)[hit])[:, np.newaxis]
+    fine[hit, 3] = 1
+    # Whole rows first, which is quickest.
+    rows = fine.reshape(-1, _FINER, 4 * width).sum(axis=1)
+    mean = rows[1:-1].reshape(-1, size[0], _FINER, 4).sum(axis=2) / _FINER**2
+    # PNG's colours are not multiplied by their opacity.
+    mean[..., :3] /= np.maximum(mean[..., 3:], 1 / _FINER**2)
+    return np.asarray(np.round(mean * (255 // _COLOUR_STEP)) * _COLOUR_STEP, dtype=np.uint8)
+
+
+def _ink(scene: _Scene, seen: Integers, hit: Integers, width: int) -> Singles:
+    """Darkness of each sample for the lines it lies on, from 0 to 1."""
+    depth = slopes(scene.corners, scene.corners[..., 2])
+    place = np.zeros(len(seen), dtype=np.float32)
+    place[hit] = depth.at(seen[hit], *np.divmod(hit, width)[::-1])
+    sharp, smooth = np.zeros((2, len(seen)), dtype=bool)
+    for step, slope in ((1, depth.along_x), (width, depth.along_y)):
+        here = np.flatnonzero(seen[:-step] != seen[step:])
+        if step == 1:
+            here = here[(here + 1) % width != 0]
+        there = here + step
+        outline = (seen[here] == NOTHING) | (seen[there] == NOTHING)
+        one, other = seen[here], seen[there]
+        change = place[there] - place[here]
+        unexplained = np.minimum(np.abs(change - slope[one]), np.abs(change - slope[other]))
+        # Where a curved surface turns away from the viewer its triangles' slopes differ much.
+        jump = unexplained > _JUMP + np.minimum(np.abs(slope[one]), np.abs(slope[other]))
+        turn = dot(scene.flat[one], scene.flat[other]) < _SHARP
+        meeting = scene.faces[one] != scene.faces[other]
+        for lines, kind in ((outline | jump | turn, sharp), (meeting, smooth)):
+            kind[here[lines]] = True
+            kind[there[lines]] = True
+    beside = sharp.copy()
+    for step in (1, width):
+        beside[step:] |= sharp[:-step]
+        beside[:-step] |= sharp[step:]
+    return np.select([sharp, beside, smooth], [_EDGE, _BESIDE, _SMOOTH], 0.0).astype(np.float32)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _NO_LENGTH))

@@ -1,4 +1,4 @@
-"""What a notebook shows of a lattice or a filled part: a picture and a small table, which open offline.
+"""Notebook view of a lattice or a filled part: a picture and a small table, which open offline.
 
 IPython asks objects for ``_repr_mimebundle_`` (its documentation, *Integrating your objects with IPython*). The picture
 stands in the HTML itself, for notebooks, and once more by itself, for what knows no HTML.
@@ -10,12 +10,10 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from gyroid_cad.errors import GyroidError
-from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.triangulation import triangulated
-from gyroid_cad.render.picture import Vector, data_uri, draw, png
+from gyroid_cad.render.drawing import draw
+from gyroid_cad.render.facets import facets_of_shape, facets_of_wall
+from gyroid_cad.render.picture import Vector, data_uri, png
 from gyroid_cad.wall.offset import Wall
 
 if TYPE_CHECKING:
@@ -26,9 +24,6 @@ __all__ = ["MimeBundle", "mime_bundle", "shape_picture", "wall_picture"]
 # What IPython takes: the data by media type, and what is to be known of them.
 MimeBundle = tuple[dict[str, Any], dict[str, Any]]
 
-# Of triangles from what they stand for, in pixels: not to be seen.
-_DEVIATION = 0.5
-_ANGLE = 20.0
 _CELL = 'style="text-align: left; padding: 0.1em 1.2em 0.1em 0"'
 
 
@@ -42,15 +37,8 @@ def wall_picture(wall: Wall, size: tuple[int, int], camera: Vector) -> bytes:
         Width and height in pixels.
     camera : tuple of float
         Direction to the viewer.
-
-    Raises
-    ------
-    ParameterError
-        If a patch would take too many triangles.
     """
-    low, high = wall.bounding_box()
-    triangulation = triangulated(wall, _deviation(float(np.linalg.norm(high - low)), size))
-    return png(draw(*indexed_triangles(triangulation), size, camera))
+    return png(draw(facets_of_wall(wall), size, camera))
 
 
 def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> bytes:
@@ -61,9 +49,7 @@ def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> 
     ExportError
         If the kernel's mesher fails.
     """
-    from gyroid_cad.kernel.stl import diagonal, meshed
-
-    return png(draw(*meshed(shape, "the picture", _deviation(diagonal(shape), size), _ANGLE), size, camera))
+    return png(draw(facets_of_shape(shape), size, camera))
 
 
 def mime_bundle(title: str, rows: Callable[[], Sequence[tuple[str, str]]], picture: Callable[[], bytes]) -> MimeBundle:
@@ -95,7 +81,3 @@ def mime_bundle(title: str, rows: Callable[[], Sequence[tuple[str, str]]], pictu
     table = "".join(f"<tr><th {_CELL}>{escape(a)}</th><td {_CELL}>{escape(b)}</td></tr>" for a, b in lines)
     data["text/html"] = f"<div>{shown}<table>{table}</table></div>"
     return data, {}
-
-
-def _deviation(diagonal: float, size: tuple[int, int]) -> float:
-    return _DEVIATION * diagonal / max(size)

@@ -1,7 +1,8 @@
-"""What can be told of a file: its solids as the kernel finds them, or its triangles."""
+"""Sections of the report on a file: its solids as the kernel finds them, or its triangles."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,7 @@ import numpy as np
 
 from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.render.drawing import Facets
-from gyroid_cad.render.facets import facets_of_triangles
+from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
 __all__ = ["FileContents", "file_section", "is_report_file", "read_contents"]
 
@@ -41,7 +41,7 @@ class FileContents:
 
 
 def is_report_file(path: str) -> bool:
-    """Whether a path's ending is one of a file that can be reported on."""
+    """Tell whether a path's ending is one of a file that can be reported on."""
     return Path(path).suffix.lower() in FORMATS
 
 
@@ -64,7 +64,7 @@ def read_contents(path: str) -> FileContents:
 
 
 def file_section(contents: FileContents) -> dict[str, Any]:
-    """What the file holds."""
+    """Section on the contents of a file."""
     return {
         "format": FORMATS[contents.path.suffix.lower()].upper(),
         "bytes": contents.path.stat().st_size,
@@ -73,7 +73,7 @@ def file_section(contents: FileContents) -> dict[str, Any]:
 
 
 def _shape_of(path: Path) -> FileContents:
-    from gyroid_cad.kernel.reading import described, read_shape, shown_triangles
+    from gyroid_cad.kernel.reading import described, read_shape
 
     shape = read_shape(path)
     found = described(shape)
@@ -86,9 +86,7 @@ def _shape_of(path: Path) -> FileContents:
         "valid": found.valid,
         **_sizes(found.low, found.high, found.volume if found.topology.closed else None, found.area),
     }
-    facets = None
-    if found.topology.faces and extent.max() > 0:
-        facets = facets_of_triangles(*shown_triangles(shape, float(extent.max())), closed=found.topology.closed)
+    facets = facets_of_shape(shape) if found.topology.faces and extent.max() > 0 else None
     return FileContents(path, measures, facets, shape=shape)
 
 
@@ -105,14 +103,14 @@ def _triangles_of(path: Path) -> FileContents:
         "open_edges": found.open_edges,
         "closed": found.closed,
         "manifold": found.manifold,
-        **_sizes(found.low, found.high, found.volume if found.closed else None, found.area),
+        **_sizes(found.low.tolist(), found.high.tolist(), found.volume if found.closed else None, found.area),
     }
     flat = found.area == 0
     facets = None if flat else facets_of_triangles(vertices, triangles, found.closed and found.volume > 0)
     return FileContents(path, measures, facets, triangles=(vertices, triangles))
 
 
-def _sizes(low: tuple[float, ...], high: tuple[float, ...], volume: float | None, area: float) -> dict[str, Any]:
+def _sizes(low: Sequence[float], high: Sequence[float], volume: float | None, area: float) -> dict[str, Any]:
     extent = [b - a for a, b in zip(low, high, strict=True)]
     box = extent[0] * extent[1] * extent[2]
     sizes: dict[str, Any] = {"bounding_box_low": list(low), "bounding_box_high": list(high), "extent": extent}

@@ -12,16 +12,16 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gyroid_cad.common.files import replacing, require_writable
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.summaries import shown_name
-from gyroid_cad.render.drawing import VIEWS, Facets, drawn
-from gyroid_cad.render.facets import COLOURS
-from gyroid_cad.render.picture import data_uri, png
-from gyroid_cad.report.charts import histogram
-from gyroid_cad.report.labels import NOTES, TITLES, label_of
+from gyroid_cad.render.drawing import draw, snug_size
+from gyroid_cad.render.facets import COLOURS, Facets
+from gyroid_cad.render.picture import VIEWS, data_uri, png
+from gyroid_cad.report.charts import NOTES, STYLE, TITLES, histogram, label_of
 from gyroid_cad.report.sections import NONE, Report
-from gyroid_cad.report.style import STYLE
 from gyroid_cad.version import __version__
 
 __all__ = ["page_of", "require_page", "write_page"]
@@ -96,7 +96,7 @@ def page_of(report: Report) -> str:
     body = [
         f"<header><h1>{title}</h1><p>Lengths in millimetres, angles in degrees.</p></header>",
         _facts(report),
-        _pictures(report.facets, report.kind),
+        _pictures(report.facets),
         *(_section(name, values) for name, values in report.sections.items()),
         f"<footer>gyroid-cad {escape(__version__)}</footer>",
     ]
@@ -125,19 +125,19 @@ def _facts(report: Report) -> str:
     return f'<div class="facts">{"".join(cards)}</div>' if cards else ""
 
 
-def _pictures(facets: Facets | None, kind: str) -> str:
+def _pictures(facets: Facets | None) -> str:
     if facets is None:
         return '<section><h2>Pictures</h2><p class="note">There is nothing to be seen.</p></section>'
     figures = []
-    for index, view in enumerate(VIEWS):
-        picture = drawn(facets, view, _LARGE if index == 0 else _SMALL)
-        height, width, _ = picture.shape
+    for index, (name, camera) in enumerate(VIEWS.items()):
+        width, height = snug_size(facets, camera, _SMALL if index else _LARGE)
+        image = data_uri(png(draw(facets, (width, height), camera)))
         figures.append(
-            f'<figure><img src="{data_uri(png(picture))}" width="{width}" height="{height}" '
-            f'alt="{escape(view.name)}"><figcaption>{escape(view.name)}</figcaption></figure>'
+            f'<figure><img src="{image}" width="{width}" height="{height}" '
+            f'alt="{escape(name)}"><figcaption>{escape(name)}</figcaption></figure>'
         )
-    # What the kernel or a file gives has one colour.
-    several = kind == "lattice" and len({tuple(colour) for colour in facets.colours[[0, -1]].tolist()}) > 1
+    # What is no lattice has one colour.
+    several = bool(np.ptp(facets.colours, axis=(0, 1)).any())
     key = f'<p class="note">{"".join(map(_swatch, _FACES, COLOURS))}</p>' if several else ""
     views = f'<div class="views">{"".join(figures)}</div>'
     return f"<section><h2>From the corner and from three sides</h2>{key}{views}</section>"

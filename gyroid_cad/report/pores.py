@@ -1,7 +1,7 @@
-"""How large the pores are: spheres that fit between the walls, by place and by volume.
+"""Sizes of pores: spheres that fit between the walls, by place and by volume.
 
 The distance to the nearest wall is the radius of the largest sphere round a place that fits. Where it is largest
-nearby, in the middle of a labyrinth's nodes, stand the inscribed spheres. By volume, the pore size at a place is the
+nearby, in the middle of a network's nodes, stand the inscribed spheres. By volume, the pore size at a place is the
 diameter of the largest sphere that fits and holds the place, wherever its centre may be: that is the pore-size
 distribution of Gelb and Gubbins (Langmuir 15, 1999, 305-308), the one that porosimetry aims at.
 """
@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field
-from gyroid_cad.report.distributions import Distribution, distribution_of
-from gyroid_cad.report.inscribed import distinct, settled
-from gyroid_cad.report.nearest import WallFaces, tree_of, wall_faces
+from gyroid_cad.report.nearest import WallFaces, distinct, settled, tree_of, wall_faces
+from gyroid_cad.report.wall_thickness import Distribution, distribution_of
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.complex import build_complex
-from gyroid_cad.wall.fitted import LaidWall
+from gyroid_cad.wall.fitted import FittedWall
 from gyroid_cad.wall.offset import Wall
-from gyroid_cad.wall.refit import fitted_wall
+from gyroid_cad.wall.refit import graded_wall
 
 __all__ = ["CONTINUED", "ENDLESS", "OPEN", "ChannelSpheres", "Pores", "inscribed_spheres", "pores_of"]
 
@@ -59,7 +58,7 @@ ENDLESS, CONTINUED, OPEN = "endless", "continued", "open"
 
 @dataclass(frozen=True, slots=True)
 class ChannelSpheres:
-    """The spheres inscribed in one labyrinth, at the places where the distance to the wall is largest nearby.
+    """The spheres inscribed in one network, at the places where the distance to the wall is largest nearby.
 
     Attributes
     ----------
@@ -88,7 +87,7 @@ class Pores:
     spacing : float
         Of the places looked at, in mm, at their widest.
     channel_a, channel_b : ChannelSpheres, optional
-        Of the labyrinth that the common normal points to, and of the other; none where no sphere is largest inside
+        Of the network that the common normal points to, and of the other; none where no sphere is largest inside
         the block.
     sizes : Distribution
         Diameters in mm, by the volume of the pores.
@@ -128,22 +127,22 @@ class _Grid:
     spacing: float
 
 
-def pores_of(laid: LaidWall) -> Pores:
+def pores_of(fitted: FittedWall) -> Pores:
     """Measure the pores of a lattice.
 
-    Of a lattice whose cells are all alike one cell is looked at, as it is among its like. Of one that varies it is the
+    Of a lattice whose cells are uniform one cell is looked at, as it is among its like. Of a graded one it is the
     block of cells, where the map carries it: spheres have their centres in the block. Those near its sides meet the
     walls that would come next, fitted for this; else every pore on the border would seem larger than it is.
 
     Parameters
     ----------
-    laid : LaidWall
+    fitted : FittedWall
 
     Returns
     -------
     Pores
     """
-    grid, faces, beyond = _scene(laid)
+    grid, faces, beyond = _scene(fitted)
     radii, outside, sides = faces.feet(grid.places, _NEIGHBOURS).nearest()
     radii = np.where(outside, radii, 0.0)
     pore = outside & grid.inside
@@ -158,7 +157,7 @@ def pores_of(laid: LaidWall) -> Pores:
     )
 
 
-def inscribed_spheres(laid: LaidWall) -> tuple[Floats, Floats, Integers]:
+def inscribed_spheres(fitted: FittedWall) -> tuple[Floats, Floats, Integers]:
     """The inscribed spheres themselves, as counted by :func:`pores_of`.
 
     Returns
@@ -168,26 +167,26 @@ def inscribed_spheres(laid: LaidWall) -> tuple[Floats, Floats, Integers]:
     radii : ndarray, shape (n,)
         In mm.
     channels : ndarray of int, shape (n,)
-        1 for the labyrinth that the common normal points to, 0 for the other.
+        1 for the network that the common normal points to, 0 for the other.
     """
-    grid, faces, _ = _scene(laid)
+    grid, faces, _ = _scene(fitted)
     radii, outside, sides = faces.feet(grid.places, _NEIGHBOURS).nearest()
     return _inscribed(faces, grid, np.where(outside, radii, 0.0), sides)
 
 
-def _scene(laid: LaidWall) -> tuple[_Grid, WallFaces, str]:
-    """Where to look, what bounds the pores, and what there is beyond the block's sides."""
-    grading, wall = laid.recipe.grading, laid.wall
+def _scene(fitted: FittedWall) -> tuple[_Grid, WallFaces, str]:
+    """Scene of the pores: the region looked at, the walls, and what there is beyond the block's sides."""
+    grading, wall = fitted.spec.grading, fitted.wall
     if grading.uniform:
-        return _grid(laid, 0.0), wall_faces(wall, grading.cell_size), ENDLESS
+        return _grid(fitted, 0.0), wall_faces(wall, grading.cell_size), ENDLESS
     try:
-        return _grid(laid, _CENTRES_BEYOND), wall_faces(_continued(laid), None), CONTINUED
+        return _grid(fitted, _CENTRES_BEYOND), wall_faces(_continued(fitted), None), CONTINUED
     except ParameterError:
-        return _grid(laid, 0.0), wall_faces(wall, None), OPEN
+        return _grid(fitted, 0.0), wall_faces(wall, None), OPEN
 
 
-def _continued(laid: LaidWall) -> Wall:
-    """The wall of a lattice that varies, with the patches that would come next beyond the block's open sides.
+def _continued(fitted: FittedWall) -> Wall:
+    """The wall of a graded lattice, with the patches that would come next beyond the block's open sides.
 
     Thickness and density stay there what they are where the lattice ends: a wall that thins out along it may be gone
     beyond.
@@ -197,8 +196,8 @@ def _continued(laid: LaidWall) -> Wall:
     ParameterError
         If the scale field or the map is no good there.
     """
-    recipe, grading = laid.recipe, laid.recipe.grading
-    closed, cells, placements = np.array(grading.closed), np.array(recipe.cells), grading.surface.cell
+    spec, grading = fitted.spec, fitted.spec.grading
+    closed, cells, placements = np.array(grading.closed), np.array(spec.cells), grading.surface.cell
     centres = placements.translations / CELL_QUARTERS
 
     def near(placement: Integers, cell: Integers) -> Booleans:
@@ -210,7 +209,7 @@ def _continued(laid: LaidWall) -> Wall:
     complex = build_complex((nx, ny, nz), placements, grading.closed, first=(x, y, z), wanted=near)
     ends = (-_REACH * grading.cell_size, (cells + _REACH) * grading.cell_size)
     held = replace(grading, thickness=_held(grading.thickness, *ends), density=_held(grading.density, *ends))
-    return fitted_wall(complex, held, len(laid.wall.weights))
+    return graded_wall(complex, held, len(fitted.wall.weights))
 
 
 def _held(value: float | Field | None, low: float, high: Floats) -> float | Field | None:
@@ -225,9 +224,9 @@ def _held(value: float | Field | None, low: float, high: Floats) -> float | Fiel
     return Field(held, field.text, parameter=field.parameter)
 
 
-def _grid(laid: LaidWall, margin: float) -> _Grid:
+def _grid(fitted: FittedWall, margin: float) -> _Grid:
     """A grid on the block, and so many cell sizes beyond its open sides."""
-    grading, cells = laid.recipe.grading, laid.recipe.cells
+    grading, cells = fitted.spec.grading, fitted.spec.cells
     endless = grading.uniform
     counted = (1, 1, 1) if endless else cells
     margins = np.where(grading.closed, 0.0, margin)
@@ -264,7 +263,7 @@ def _neighbours(grid: _Grid) -> Iterator[tuple[Integers, Booleans]]:
 
 
 def _inscribed(faces: WallFaces, grid: _Grid, radii: Floats, sides: Integers) -> tuple[Floats, Floats, Integers]:
-    """Centres, radii and labyrinths of the largest spheres nearby."""
+    """Centres, radii and networks of the largest spheres nearby."""
     top = (radii > 0) & grid.inside
     for other, within in _neighbours(grid):
         # At the block's sides the next larger sphere may stand just outside.

@@ -20,12 +20,12 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.printing.print_check import PrintCheck, print_check
 from gyroid_cad.printing.printers import printer_named
-from gyroid_cad.render.drawing import Facets
-from gyroid_cad.render.facets import facets_of_triangles, facets_of_wall
+from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_wall
 from gyroid_cad.report.file_sections import FileContents, file_section, read_contents
 from gyroid_cad.report.pores import ChannelSpheres, pores_of
 from gyroid_cad.report.wall_thickness import exact_areas, fitted_areas, wall_thickness
-from gyroid_cad.surface.fit import fit_patch, fit_report
+from gyroid_cad.surface.fit import fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -67,7 +67,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is told of a lattice or a file.
+    """Report on a lattice or a file, by sections.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def report_on_lattice(
     seconds: dict[str, float] = {}
     sections = {}
     with timed(seconds, "wall", progress):
-        lattice.laid(progress)
+        lattice.fitted(progress)
     for name, section in LATTICE_SECTIONS.items():
         with timed(seconds, name.replace("_", " "), progress):
             sections[name] = section(subject)
@@ -180,15 +180,12 @@ def require_subdivisions(subdivisions: int) -> int:
 
 def _facets(lattice: Lattice) -> Facets:
     if lattice.trim is None:
-        return facets_of_wall(lattice.laid().wall)
-    from gyroid_cad.kernel.reading import shown_triangles
-
-    extent = max(lattice.cells) * lattice.cell_size
-    return facets_of_triangles(*shown_triangles(lattice.built().solid(), extent), closed=True)
+        return facets_of_wall(lattice.fitted().wall)
+    return facets_of_shape(lattice.built().solid())
 
 
 def parameters_section(subject: Subject) -> Values:
-    """What was asked for."""
+    """Section on the parameters."""
     lattice = subject.lattice
     fields = {name: getattr(lattice, name) for name in ("thickness", "density", "scale_field", "map")}
     return {
@@ -202,14 +199,14 @@ def parameters_section(subject: Subject) -> Values:
         },
         **({} if lattice.trim is None else {"trim": lattice.trim}),
         **({} if lattice.tolerance is None else {"tolerance": lattice.tolerance}),
-        "control_points": len(lattice.laid().wall.weights),
+        "control_points": len(lattice.fitted().wall.weights),
     }
 
 
 def measures_section(subject: Subject) -> Values:
     """Density, volume and areas, of the fitted lattice and of the exact one."""
     lattice = subject.lattice
-    laid = lattice.laid()
+    fitted = lattice.fitted()
     low, high = (np.array(corner) for corner in lattice.bounding_box())
     block = lattice.exact_volume / lattice.volume_fraction
     values: Values = {
@@ -220,23 +217,23 @@ def measures_section(subject: Subject) -> Values:
         "bounding_box_low": low.tolist(),
         "bounding_box_high": high.tolist(),
         "extent": (high - low).tolist(),
-        "patches": lattice.built().patches if lattice.trim else laid.complex.patch_count,
+        "patches": lattice.built().patches if lattice.trim else fitted.complex.patch_count,
     }
     if lattice.trim:
         return values | _trimmed_measures(lattice)
-    fitted, rim = fitted_areas(laid)
-    exact = exact_areas(laid)
-    volume = laid.wall.volume()
-    faces, faces_exact = fitted.face_a + fitted.face_b, exact.face_a + exact.face_b
+    areas, rim = fitted_areas(fitted)
+    exact = exact_areas(fitted)
+    volume = fitted.wall.volume()
+    faces, faces_exact = areas.face_a + areas.face_b, exact.face_a + exact.face_b
     return values | {
-        "pieces": laid.complex.component_count,
-        "free_edges": int(laid.complex.free.sum()),
-        "pinch_lines": laid.complex.pinch_lines,
+        "pieces": fitted.complex.component_count,
+        "boundary_edges": int(fitted.complex.free.sum()),
+        "non_manifold_edges": fitted.complex.non_manifold_edges,
         "volume": volume,
         "volume_exact": lattice.exact_volume,
         "volume_error": volume / lattice.exact_volume - 1,
-        "face_a_area": fitted.face_a,
-        "face_b_area": fitted.face_b,
+        "face_a_area": areas.face_a,
+        "face_b_area": areas.face_b,
         "faces_area": faces,
         "faces_area_exact": faces_exact,
         "faces_area_error": faces / faces_exact - 1,
@@ -248,7 +245,7 @@ def measures_section(subject: Subject) -> Values:
 
 
 def _trimmed_measures(lattice: Lattice) -> Values:
-    """What the kernel says of the solid that is cut to the block."""
+    """Measures of the solid that is cut to the block, by the kernel."""
     from gyroid_cad.kernel.reading import described
 
     built = lattice.built()
@@ -267,11 +264,11 @@ def _trimmed_measures(lattice: Lattice) -> Values:
 
 
 def fit_section(subject: Subject) -> Values:
-    """How far the fitted lattice is from the exact one."""
+    """Section on the fitted lattice against the exact one."""
     lattice = subject.lattice
-    laid = lattice.laid()
-    if laid.refit is not None:
-        refit = laid.refit
+    fitted = lattice.fitted()
+    if fitted.refit is not None:
+        refit = fitted.refit
         return {
             "control_points": refit.control_points,
             "max_deviation": refit.max_deviation,
@@ -279,9 +276,9 @@ def fit_section(subject: Subject) -> Values:
             "max_wall_error": refit.max_wall_error,
             "samples_per_patch": refit.samples**2,
         }
-    found = fit_report(fit_patch(laid.recipe.settings, lattice.minimal_surface.family))
+    found = fit_report(fit_patch(fitted.spec.settings, lattice.minimal_surface.family))
     return {
-        "control_points": laid.recipe.settings.control_points,
+        "control_points": fitted.spec.settings.control_points,
         "max_deviation": found.max_distance * lattice.cell_size,
         "rms_deviation": found.rms_distance * lattice.cell_size,
         "max_normal_angle": found.max_normal_angle,
@@ -291,14 +288,14 @@ def fit_section(subject: Subject) -> Values:
 
 
 def wall_section(subject: Subject) -> Values:
-    """How thick the fitted wall is."""
-    found = wall_thickness(subject.lattice.laid())
+    """Section on the fitted wall's thickness."""
+    found = wall_thickness(subject.lattice.fitted())
     return {"thickness": found.thickness.as_dict(), "error": found.error.as_dict()}
 
 
 def pores_section(subject: Subject) -> Values:
-    """How large the pores are."""
-    found = pores_of(subject.lattice.laid())
+    """Section on the sizes of pores."""
+    found = pores_of(subject.lattice.fitted())
     return {
         "beyond": found.beyond,
         "spacing": found.spacing,
@@ -312,11 +309,11 @@ def pores_section(subject: Subject) -> Values:
 def _spheres(found: ChannelSpheres | None) -> Values:
     if found is None:
         return {NONE: "no sphere is largest inside"}
-    return {"count": found.count, "smallest_diameter": found.smallest, "largest_diameter": found.largest}
+    return {"count": found.count, "min_diameter": found.smallest, "max_diameter": found.largest}
 
 
 def quality_section(subject: Subject) -> Values:
-    """What hexahedra of this lattice would be worth."""
+    """Section on the quality of this lattice's hexahedra."""
     lattice = subject.lattice
     if lattice.trim:
         return {NONE: "meshes are made of whole patches: without trim"}
@@ -336,14 +333,14 @@ def quality_section(subject: Subject) -> Values:
 
 
 def print_check_section(subject: Subject) -> Values:
-    """Whether a printer could make it."""
+    """Section on the print check of a lattice."""
     if subject.lattice.trim:
         return {NONE: "a trimmed lattice is checked as the STL file that it is written to"}
     return _checked(print_check(subject.lattice, subject.printer))
 
 
 def file_print_check_section(contents: FileContents) -> Values:
-    """Whether a printer could make what is in a file of triangles."""
+    """Section on the print check of a file of triangles."""
     if contents.triangles is None:
         return {NONE: "only triangles are checked: write the part as STL or 3MF"}
     try:

@@ -8,15 +8,16 @@ the edge, so two patches that meet there get the same ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
+from math import ceil
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, gauss_points
-from gyroid_cad.surface.fit_settings import DEGREE, MOST_CONTROL_POINTS, FitSettings, more_control_points
+from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, gauss_points, uniform_knots
 from gyroid_cad.surface.patch import (
     EDGE_HALF_TURN,
     PARAMETERISATIONS,
@@ -27,31 +28,134 @@ from gyroid_cad.surface.patch import (
 from gyroid_cad.surface.weierstrass import GYROID, Family
 
 __all__ = [
-    "FitReport",
+    "DEGREE",
     "FitSettings",
     "FittedPatch",
     "edge_gap",
     "fit_patch",
-    "fit_report",
-    "fit_within",
-    "largest_offset",
+    "max_offset",
+    "more_control_points",
     "require_shared_edges",
 ]
 
 Floats = NDArray[np.float64]
 
+DEGREE = 3
+FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS = 4, 40
+# The error of a cubic fit falls with the fourth power of the number of spans; a little more than needed is taken.
+_ORDER, _SURPLUS = 4, 1.05
+
+
+@dataclass(frozen=True, slots=True)
+class FitSettings:
+    """Settings of the patch's fit.
+
+    Attributes
+    ----------
+    control_points : int
+        Along each side, 4 to 40.
+    knots : tuple of float, optional
+        Clamped on [-1, 1], symmetric about 0, control_points + 4 long; evenly spaced if left out.
+    weights : tuple of tuples of float, optional
+        Positive, control_points x control_points; all 1 if left out.
+    parameterisation : {"smooth", "polar"}
+        "polar" is the paper's: its cloud of points has no edges of its own, so it is fitted all at once.
+
+    Raises
+    ------
+    ParameterError
+    """
+
+    control_points: int = 10
+    knots: tuple[float, ...] | None = None
+    weights: tuple[tuple[float, ...], ...] | None = None
+    parameterisation: str = "smooth"
+
+    def __post_init__(self) -> None:
+        n = self.control_points
+        if isinstance(n, bool) or not isinstance(n, int | np.integer):
+            raise ParameterError("control_points", n, "a whole number")
+        if not FEWEST_CONTROL_POINTS <= n <= MOST_CONTROL_POINTS:
+            raise ParameterError("control_points", n, f"{FEWEST_CONTROL_POINTS} to {MOST_CONTROL_POINTS} a side")
+        if self.parameterisation not in tuple(PARAMETERISATIONS):
+            raise ParameterError("parameterisation", self.parameterisation, " or ".join(PARAMETERISATIONS))
+        if self.knots is not None:
+            object.__setattr__(self, "knots", _validated_knots(self.knots, n))
+        if self.weights is not None:
+            object.__setattr__(self, "weights", _validated_weights(self.weights, n))
+
+    @classmethod
+    def paper(cls) -> Self:
+        """The paper's fit: its polar cloud, the knots of eq. (14), the weights of Fig. 7."""
+        inner = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)
+        weights = np.ones((10, 10))
+        weights[3:7, 3:7] = 3 / 2
+        weights[4:6, 4:6] = 3 / 4
+        weights[np.ix_([0, -1], [0, -1])] = 1 / 4
+        rows = tuple(tuple(row) for row in weights.tolist())
+        return cls(10, (-1.0,) * 4 + inner + (1.0,) * 4, rows, "polar")
+
+    @property
+    def plain(self) -> bool:
+        """True where knots are evenly spaced and weights equal, so that the number can change."""
+        return self.knots is None and self.weights is None and self.parameterisation == "smooth"
+
+    def knot_vector(self) -> Floats:
+        """The knots, evenly spaced where none were given; shape (control_points + 4,)."""
+        return uniform_knots(self.control_points, DEGREE) if self.knots is None else np.array(self.knots)
+
+    def weight_net(self) -> Floats:
+        """The weights, 1 where none were given; shape (control_points, control_points)."""
+        return np.ones((self.control_points,) * 2) if self.weights is None else np.array(self.weights)
+
+
+def more_control_points(control_points: int, excess: float) -> int:
+    """Number of control points to try next, where the error of a fit is ``excess`` times what it may be."""
+    wanted = DEGREE + (control_points - DEGREE) * (_SURPLUS * excess) ** (1 / _ORDER)
+    return int(min(max(control_points + 1, ceil(wanted)), MOST_CONTROL_POINTS))
+
+
+def _validated_knots(knots: tuple[float, ...], control_points: int) -> tuple[float, ...]:
+    accepted = (
+        f"{control_points + DEGREE + 1} non-decreasing numbers, four times -1, four times 1 "
+        "and between them distinct ones symmetric about 0"
+    )
+    try:
+        vector = np.array(knots, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError("knots", knots, accepted) from None
+    good = (
+        vector.shape == (control_points + DEGREE + 1,)
+        and np.all(vector[:4] == -1)
+        and np.all(vector[-4:] == 1)
+        and np.all(np.diff(vector[3:-3]) > 0)
+        and np.allclose(vector, -vector[::-1], rtol=0, atol=1e-12)
+    )
+    if not good:
+        raise ParameterError("knots", knots, accepted)
+    return tuple(vector.tolist())
+
+
+def _validated_weights(weights: tuple[tuple[float, ...], ...], control_points: int) -> tuple[tuple[float, ...], ...]:
+    accepted = f"{control_points} x {control_points} positive numbers"
+    try:
+        net = np.array(weights, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError("weights", weights, accepted) from None
+    if net.shape != (control_points, control_points) or not np.all(np.isfinite(net) & (net > 0)):
+        raise ParameterError("weights", weights, accepted)
+    return tuple(tuple(row) for row in net.tolist())
+
+
 # Edges further apart than this, in units of the cell size, are not one edge: rounding leaves 1e-15.
 EDGE_GAP_LIMIT = 1e-12
 _SAMPLES_PER_SPAN = 4
 _CLOUD_RADII = 48
-_REPORT_SAMPLES_PER_SPAN = 8
-_MOST_REPORT_SAMPLES = 121
-_FOOT_POINT_STEPS = 4
 # Odd, so that the patch's centre, where it curves most, is among them.
 _FOLD_SAMPLES = 97
 _OURS = FitSettings()
 # Lengths here are in bounding-cell lengths a; reports are in cell sizes L = 2 a.
-_CELL_SIZE = 2.0
+CELL_SIZE = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,23 +182,6 @@ class FittedPatch:
         net = self.surface.control_points + distance * self.normals.control_points
         return NurbsSurface(net, self.surface.weights, self.surface.knots_u, self.surface.knots_v)
 
-    def report(self) -> FitReport:
-        """What the fit is worth, measured once; see :func:`fit_report`."""
-        return fit_report(self)
-
-
-@dataclass(frozen=True, slots=True)
-class FitReport:
-    """What a fit is worth; lengths in units of the cell size L, angles in degrees, curvature in 1/L."""
-
-    max_distance: float
-    rms_distance: float
-    max_normal_angle: float
-    max_mean_curvature: float
-    rms_mean_curvature: float
-    edge_gap: float
-    corner_error: float
-
 
 @lru_cache(maxsize=32)
 def fit_patch(settings: FitSettings = _OURS, family: Family = GYROID) -> FittedPatch:
@@ -116,79 +203,18 @@ def fit_patch(settings: FitSettings = _OURS, family: Family = GYROID) -> FittedP
     return FittedPatch(settings, family, surface, normals)
 
 
-@lru_cache(maxsize=32)
-def fit_report(fitted: FittedPatch) -> FitReport:
-    """Measure a fit against the exact surface on a dense grid.
-
-    Distance is measured along the exact normal through the exact point, to where that line meets the
-    fitted surface (Newton's method); the angle is that between the two normals there.
-    """
-    n = fitted.settings.control_points
-    samples = np.linspace(-1, 1, min(_REPORT_SAMPLES_PER_SPAN * (n - DEGREE) + 1, _MOST_REPORT_SAMPLES))
-    u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
-    exact = PARAMETERISATIONS[fitted.settings.parameterisation]
-    points, normals = exact(u, v, fitted.family)
-    distance = np.zeros(len(u))
-    foot_u, foot_v = u.copy(), v.copy()
-    for _ in range(_FOOT_POINT_STEPS):
-        d = fitted.surface.derivatives(foot_u, foot_v)
-        residual = points + distance[:, np.newaxis] * normals - d[0, 0]
-        jacobian = np.stack([d[1, 0], d[0, 1], -normals], axis=-1)
-        step = np.linalg.solve(jacobian, residual[..., np.newaxis])[..., 0]
-        foot_u, foot_v, distance = foot_u + step[:, 0], foot_v + step[:, 1], distance + step[:, 2]
-        # Newton's steps square: after one this small nothing is left to gain.
-        if np.max(np.abs(step)) < 1e-8:
-            break
-    sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
-    curvature = fitted.surface.mean_curvature(samples[:, np.newaxis], samples[np.newaxis]) * _CELL_SIZE
-    corner_u, corner_v = parameter_corners().T
-    off_corners = fitted.surface.evaluate(corner_u, corner_v) - exact(corner_u, corner_v, fitted.family)[0]
-    return FitReport(
-        max_distance=float(np.max(np.abs(distance))) / _CELL_SIZE,
-        rms_distance=float(np.sqrt(np.mean(distance**2))) / _CELL_SIZE,
-        max_normal_angle=float(np.degrees(np.arcsin(np.max(sine)))),
-        max_mean_curvature=float(np.max(np.abs(curvature))),
-        rms_mean_curvature=float(np.sqrt(np.mean(curvature**2))),
-        edge_gap=edge_gap(fitted),
-        corner_error=float(np.max(np.linalg.norm(off_corners, axis=1)) / _CELL_SIZE),
-    )
-
-
-def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID) -> FitSettings:
-    """The same settings, with as many more control points as a tolerance takes.
-
-    Parameters
-    ----------
-    settings : FitSettings
-    tolerance : float
-        Largest deviation of the mid-surface, in cell sizes.
-    family : Family
-
-    Raises
-    ------
-    ParameterError
-        If it is out of reach, or the settings' own knots and weights miss it.
-    """
-    while (reached := fit_report(fit_patch(settings, family)).max_distance) > tolerance:
-        n = settings.control_points
-        if n == MOST_CONTROL_POINTS or not settings.plain:
-            raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
-        settings = replace(settings, control_points=more_control_points(n, reached / tolerance))
-    return settings
-
-
 def edge_gap(fitted: FittedPatch) -> float:
     """Largest distance, in cell sizes, between an edge of the fit and the same edge of its neighbour.
 
     The neighbour is the patch's image under the half-turn about the normal at the edge's midpoint. It meets the edge
     with one of its own, run backwards; which one depends on the placement, so every pair is compared.
     """
-    return _gap(fitted.surface, edge_half_turn_shift(fitted.family)) / _CELL_SIZE
+    return _gap(fitted.surface, edge_half_turn_shift(fitted.family)) / CELL_SIZE
 
 
 @lru_cache(maxsize=32)
-def largest_offset(fitted: FittedPatch) -> float:
-    """How far the fit can be offset to both sides before it folds over, in bounding-cell lengths.
+def max_offset(fitted: FittedPatch) -> float:
+    """Largest offset of the fit to both sides before it folds over, in bounding-cell lengths.
 
     The exact surface folds at its smallest radius of curvature; the fit a little before. Where it is
     offset by s, its area vector along the normal is a + b s + c s^2; the smallest root over a dense grid counts.
@@ -270,7 +296,7 @@ def _fit_staged(settings: FitSettings, family: Family) -> Floats:
 
 
 def _missing_normals(rational: Floats, quadrature: Floats, area: Floats, normals: Floats) -> Floats:
-    """What the inner control points of the normals lack to carry the surface's whole area.
+    """Correction to the normals' inner control points that makes them carry the surface's whole area.
 
     Least squares leave the sum of N . dA short by 7.5e-7 of the area at 10 x 10, and every wall's volume with
     it. The missing part is spread along the area vectors; edges, which neighbours share, keep theirs.

@@ -192,7 +192,7 @@ def _edge_chart(sigma: Floats, family: Family) -> tuple[Floats, Floats]:
 
 
 def _plan(u: Floats, v: Floats, family: Family) -> Floats:
-    """Where (u, v) lies in the view along the patch's axis (x, y of the Weierstrass frame)."""
+    """Place of (u, v) in the view along the patch's axis (x, y of the Weierstrass frame)."""
     parameters, inverse = np.unique(np.concatenate([u, v, -u, -v]), return_inverse=True)
     edge = _edge(parameters, family)
     at_u, at_v, at_minus_u, at_minus_v = edge[inverse].reshape(4, -1, 3)

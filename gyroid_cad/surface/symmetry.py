@@ -1,4 +1,4 @@
-"""From the semi-fundamental patch (SFP) to the cubic cell, in integers.
+"""Symmetry: the semi-fundamental patch (SFP), its bounding cell and cubic cell, in integers.
 
 Every corner of every patch lies on the grid of quarters of the bounding-cell length, so placements are
 signed permutations and translations in quarters: nothing here is rounded, and equality is exact.
@@ -25,6 +25,8 @@ __all__ = [
     "Neighbour",
     "Patch",
     "Placements",
+    "bounding_cell",
+    "cubic_cell",
     "orbit",
     "placed_corners",
 ]
@@ -43,7 +45,7 @@ _NORMAL = np.array([1, 0, 1])
 
 
 class Neighbour(Enum):
-    """How a patch's neighbour across an edge follows: the isometry, and whether it exchanges the surface's sides."""
+    """Rule by which a patch's neighbour across an edge follows: the isometry, and the side it leads to."""
 
     HALF_TURN_ABOUT_NORMAL = "half-turn about the surface's normal at the edge's midpoint"
     HALF_TURN_ABOUT_EDGE = "half-turn about the edge, a straight line"
@@ -199,7 +201,7 @@ def orbit(patch: Patch, first: tuple[int, int, int]) -> Placements:
 
 
 def _place(patch: Patch, matrix: Integers, translation: Integers) -> Hashable:
-    """What tells places apart that differ by more than whole cells and symmetries of the patch."""
+    """Key that tells places apart that differ by more than whole cells and symmetries of the patch."""
     corners = patch.corner_array @ matrix.T
     return tuple((translation % CELL_QUARTERS).tolist()), frozenset(map(tuple, corners.tolist()))
 
@@ -217,3 +219,49 @@ def _upright(patch: Patch, matrix: Integers, translation: Integers, side: int) -
     if patch.mirror is None:
         raise ValueError("a patch without a mirror cannot be turned over within its place")
     return matrix @ -_half_turn(np.array(patch.mirror)), translation
+
+
+# Eqs. (4), (5) at the angles the paper uses.
+_T_X, _T_Y, _T_Z = np.diag([-1, 1, 1]), np.diag([1, -1, 1]), np.diag([1, 1, -1])
+_R_X_BACK = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+_R_Y_BACK = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+_D = _T_Z @ _R_Y_BACK @ _R_X_BACK
+_A = 4  # one bounding-cell length, in quarters
+
+
+def bounding_cell(patch: Patch) -> Placements:
+    """The six patches of eqs. (15) to (17), which meet at (1/2, 1/2, 1/2).
+
+    Parameters
+    ----------
+    patch : Patch
+        The gyroid's.
+    """
+    centred = Placements(patch, np.eye(3, dtype=np.int64)[np.newaxis], ORIGIN[np.newaxis], ORIGIN[:1])
+    placed = [centred.transformed(np.eye(3, dtype=np.int64), (4, 2, 1))]
+    for _ in range(5):
+        placed.append(placed[-1].transformed(_D, (0, 0, _A)))
+    return placed[0].joined(*placed[1:])
+
+
+def cubic_cell(patch: Patch) -> Placements:
+    """The 24 patches of eqs. (18), (19), corrected: B2 = T_y B + A(1, 0, 0).
+
+    Four bounding cells at alternate places of a 2 x 2 x 2 block; the block is moved so that its lowest
+    corner is the origin.
+
+    Parameters
+    ----------
+    patch : Patch
+        The gyroid's.
+    """
+    b = bounding_cell(patch)
+    cells = [
+        b,
+        b.transformed(_T_Y, (_A, 0, 0)),
+        b.transformed(_T_Y @ _T_Z, (_A, _A, 0)),
+        b.transformed(_T_X @ _T_Y, (_A, 0, -_A)),
+    ]
+    numbers = np.repeat(np.arange(len(cells)), len(b))
+    every = cells[0].joined(*cells[1:]).transformed(np.eye(3, dtype=np.int64), (0, _A, _A))
+    return Placements(patch, every.matrices, every.translations, numbers)

@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.caps import Cap, CapArc, caps_of
 from gyroid_cad.trim.edge_crossings import PLANES, Faces
 from gyroid_cad.trim.sections import Sections
 from gyroid_cad.trim.trimmed_faces import CORNER, RIM, Arc, CutFace, Node, cut_faces
-from gyroid_cad.wall.complex import connected
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Box", "BoxEdge", "BoxFace", "BoxedWall", "cut_to_box"]
+__all__ = ["Box", "BoxEdge", "BoxFace", "TrimmedWall", "cut_to_box"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -54,7 +54,7 @@ class Box:
 
     @property
     def levels(self) -> Floats:
-        """Of each of :data:`~gyroid_cad.trim.edge_crossings.PLANES`, along its axis; shape (6,)."""
+        """Levels of :data:`~gyroid_cad.trim.edge_crossings.PLANES`, each along its axis; shape (6,)."""
         return np.array([(self.low if sign > 0 else self.high)[axis] for axis, sign in PLANES])
 
 
@@ -70,7 +70,7 @@ class BoxEdge:
         Parameters of the curve there; of no use for a straight edge.
     patch, side : int
         Whose curve it is; -1 for a straight edge of the box.
-    rim : int
+    patch_edge : int
         Which border curve of the patch; -1 if it is a section curve.
     sections : Sections, optional
     curve : int
@@ -83,7 +83,7 @@ class BoxEdge:
     last: float
     patch: int = -1
     side: int = -1
-    rim: int = -1
+    patch_edge: int = -1
     sections: Sections | None = None
     curve: int = -1
 
@@ -98,7 +98,7 @@ class BoxFace:
     loops : list of list of (int, bool)
         Edges, and whether they are used the way they run; what is left of the face is on the left, seen from where the
         patch's own normal points.
-    rims : list of list of int
+    patch_edges : list of list of int
         Which border of the patch each of them belongs to; -1 for section curves.
     backwards : bool
         Whether the solid lies on the side that the normal points to.
@@ -107,13 +107,13 @@ class BoxFace:
     patch: int
     side: int
     loops: list[list[tuple[int, bool]]]
-    rims: list[list[int]]
+    patch_edges: list[list[int]]
     backwards: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BoxedWall:
-    """What is left of a wall, or of a labyrinth beside it, in a box.
+class TrimmedWall:
+    """A wall, or a network beside it, trimmed to a box.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class BoxedWall:
 
 def cut_to_box(
     wall: Wall, box: Box, sides: list[tuple[int, bool]], cell_size: float, filled: bool, capped: bool = True
-) -> BoxedWall:
+) -> TrimmedWall:
     """Cut a wall's faces to a box and close what is left with caps.
 
     Parameters
@@ -216,7 +216,7 @@ class _Assembly:
         for patch, index in zip(patches.tolist(), template.tolist(), strict=True):
             self._add_cut(patch, side, cut[index], backwards)
 
-    def finished(self, filled: bool, capped: bool) -> BoxedWall:
+    def finished(self, filled: bool, capped: bool) -> TrimmedWall:
         """With the caps, if they are wanted."""
         caps = caps_of(self.arcs, self.box.low, self.box.high, self._straight, filled) if capped else []
         uses = [[edge for loop in face.loops for edge, _ in loop] for face in self.faces]
@@ -230,7 +230,7 @@ class _Assembly:
         count = int(component.max()) + 1 if len(component) else 0
         totals = [np.asarray(np.bincount(component, values, count), dtype=np.float64) for values in (fluxes, areas)]
         points = [point @ self.box.axes.T for point in self.points]
-        return BoxedWall(
+        return TrimmedWall(
             self.wall,
             self.box,
             points,
@@ -254,7 +254,7 @@ class _Assembly:
             raise KernelError("what the box leaves of the lattice does not close: its area vectors do not add up to 0")
 
     def _positions(self, side: int) -> tuple[Booleans, Floats]:
-        """Which patches' faces lie outside; and, from each patch's own place, levels of the planes that are near."""
+        """Patches whose faces lie outside; and, from each patch's own place, levels of the planes that are near."""
         low, high = (
             reach(self.nets[:, side], axis=(1, 2))[self.wall.patch_net] + self.shifts for reach in (np.min, np.max)
         )
@@ -275,18 +275,18 @@ class _Assembly:
         self.fluxes += (sign * (sums[:, 0] + np.sum(offsets * sums[:, 1:4], axis=1) / 3)).tolist()
         self.areas += sums[:, 4].tolist()
         self.vectors += list(sign * sums[:, 1:4])
-        rims = [list(range(4))]
+        patch_edges = [list(range(4))]
         for patch in patches.tolist():
             loop = [self._rim_edge(patch, side, k, 0, 1, -1.0, 1.0, None) for k in range(4)]
-            self.faces.append(BoxFace(patch, side, [loop], rims, backwards))
+            self.faces.append(BoxFace(patch, side, [loop], patch_edges, backwards))
 
     def _add_cut(self, patch: int, side: int, cut: CutFace, backwards: bool) -> None:
         offset = self.shifts[patch] - self.middle
         sign = -1.0 if backwards else 1.0
         for piece in cut.pieces:
             loops = [[self._edge(patch, side, cut, arc, backwards) for arc in loop] for loop in piece.loops]
-            rims = [[arc.side for arc in loop] for loop in piece.loops]
-            self.faces.append(BoxFace(patch, side, loops, rims, backwards))
+            patch_edges = [[arc.side for arc in loop] for loop in piece.loops]
+            self.faces.append(BoxFace(patch, side, loops, patch_edges, backwards))
             self.fluxes.append(sign * (piece.flux + float(offset @ piece.area_vector) / 3))
             self.areas.append(piece.area)
             self.vectors.append(sign * piece.area_vector)
@@ -367,7 +367,7 @@ class _Assembly:
 
 
 def _alike(nets: Integers, levels: Floats, grain: float) -> tuple[Integers, Integers, Floats]:
-    """Which faces are cut alike: the kind of each; and the net and the levels of each kind."""
+    """Group faces that are cut alike: the kind of each; and the net and the levels of each kind."""
     if not len(nets):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, len(PLANES)))
     grains = np.where(np.isnan(levels), np.iinfo(np.int64).min / 2, np.rint(levels / grain))
@@ -377,7 +377,7 @@ def _alike(nets: Integers, levels: Floats, grain: float) -> tuple[Integers, Inte
 
 
 def _components(uses: list[list[int]], edge_count: int, closed: bool) -> Integers:
-    """Faces that hang together by edges, each of which must be used twice, or once where there may be a border."""
+    """Faces that are connected by edges, each of which must be used twice, or once where there may be a border."""
     if not uses:
         return np.zeros(0, dtype=np.int64)
     face = np.repeat(np.arange(len(uses)), [len(edges) for edges in uses])

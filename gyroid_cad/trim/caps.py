@@ -89,7 +89,7 @@ class Cap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Link:
-    """What a cap's loop takes from one vertex, or corner, to the next."""
+    """Step of a cap's loop from one vertex, or corner, to the next."""
 
     edge: int
     forward: bool
@@ -205,7 +205,7 @@ def _stops(arcs: list[list[CapArc]], planes: tuple[int, int]) -> list[tuple[int,
 
 
 def _upwards(plane: int, other: int) -> bool:
-    """Whether round a side of the box, seen from outside, one runs up the edge it shares with another side."""
+    """True if round a side of the box, seen from outside, one runs up the edge it shares with another side."""
     x, y = plane_axes(plane)
     axis, sign = PLANES[other]
     # Anticlockwise: along x at the low y, up y at the high x, back along x at the high y, down y at the low x.

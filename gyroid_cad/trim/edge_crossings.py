@@ -14,7 +14,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.roots import roots
 from gyroid_cad.nurbs.surface import basis
 
-__all__ = ["AXES", "PLANES", "Faces", "Rims", "plane_heights", "rim_crossings", "square_points"]
+__all__ = ["AXES", "PLANES", "EdgeCrossings", "Faces", "edge_crossings", "plane_heights", "square_points"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -95,15 +95,15 @@ class Faces:
         return basis(self.knots, 3, x.ravel(), derivative).reshape(*x.shape, len(self.weights))
 
     def heights(self, which: Integers, u: Floats, v: Floats) -> Floats:
-        """How far points lie on the kept side of every plane, in mm; shape (m, q, 6), infinite for planes not near."""
+        """Height of points over every plane, on its kept side, in mm; shape (m, q, 6), infinite for planes not near."""
         points = self.points(which, u, v)
         heights = _SIGNS * (points[..., AXES] - self.levels[which][:, np.newaxis])
         return np.where(np.isnan(heights), np.inf, heights)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rims:
-    """Where sides of the square cross planes, ordered by face, then side, then along the side.
+class EdgeCrossings:
+    """Crossings of the square's sides with planes, ordered by face, then side, then along the side.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Rims:
 
     @property
     def places(self) -> Floats:
-        """In the square; shape (crossings, 2)."""
+        """Places of the crossings in the square; shape (crossings, 2)."""
         return np.stack(square_points(self.side, self.along), axis=-1)
 
 
@@ -142,8 +142,8 @@ def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:
     return u, v
 
 
-def rim_crossings(faces: Faces) -> Rims:
-    """Where the sides of faces cross the planes near them.
+def edge_crossings(faces: Faces) -> EdgeCrossings:
+    """Find the crossings of faces' sides with the planes near them.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def rim_crossings(faces: Faces) -> Rims:
     if np.any(touching | (np.abs(along) > 1 - _TOUCHING)):
         raise KernelError("an edge of the lattice touches the box")
     order = np.lexsort((along, side, face))
-    return Rims(face[order], side[order], plane[order], along[order], (across > 0)[order])
+    return EdgeCrossings(face[order], side[order], plane[order], along[order], (across > 0)[order])
 
 
 def plane_heights(faces: Faces, face: Integers, plane: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 
-__all__ = ["holds", "linked", "nested", "signed_area"]
+__all__ = ["contains", "linked", "nested", "signed_area"]
 
 Floats = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def nested(outlines: Sequence[Floats]) -> list[list[int]]:
     areas = np.array([signed_area(outline) for outline in outlines])
     groups = {index: [index] for index in np.flatnonzero(areas > 0).tolist()}
     for hole in np.flatnonzero(areas <= 0).tolist():
-        around = [index for index in groups if holds(outlines[index], outlines[hole][0])]
+        around = [index for index in groups if contains(outlines[index], outlines[hole][0])]
         if not around:
             raise KernelError("a hole in a face that the box has cut lies in none of its pieces")
         groups[min(around, key=lambda index: float(areas[index]))].append(hole)
@@ -77,8 +77,8 @@ def signed_area(outline: Floats) -> float:
     return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
 
 
-def holds(outline: Floats, place: Floats) -> bool:
-    """Whether a place, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
+def contains(outline: Floats, place: Floats) -> bool:
+    """Tell whether a point, shape (2,), lies in a polygon, shape (k, 2): by the crossings of a ray."""
     x, y = (outline - place).T
     next_x, next_y = np.roll(x, -1), np.roll(y, -1)
     crosses = (y > 0) != (next_y > 0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.surface import basis
-from gyroid_cad.trim.edge_crossings import AXES, Faces, Rims, plane_heights
+from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, Faces, plane_heights
 
 __all__ = ["Sections", "plane_sections", "section_knots"]
 
@@ -94,13 +94,13 @@ def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
     return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
 
 
-def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
+def plane_sections(faces: Faces, crossings: EdgeCrossings, size: float) -> Sections:
     """The curves between the crossings of the sides.
 
     Parameters
     ----------
     faces : Faces
-    rims : Rims
+    crossings : EdgeCrossings
     size : float
         Of a cell in mm, by which closeness is measured.
 
@@ -108,19 +108,19 @@ def plane_sections(faces: Faces, rims: Rims, size: float) -> Sections:
     ------
     KernelError
         If a curve cannot be followed from one side to another: then the face touches the plane. Or if one closes
-        within the square, as only a wall that varies wildly has them.
+        within the square, as only a graded wall wildly has them.
     """
     _require_open_curves(faces)
-    starts = np.flatnonzero(rims.entering)
+    starts = np.flatnonzero(crossings.entering)
     for step in _STEPS:
-        paths = _followed(faces, rims, starts, step)
-        ends = _exits(rims, starts, paths, 2 * step)
+        paths = _followed(faces, crossings, starts, step)
+        ends = _exits(crossings, starts, paths, 2 * step)
         if ends is not None:
             break
     else:
         raise KernelError("a face of the lattice touches the box: where they cross cannot be followed")
-    ways = [np.vstack([path[:-1], rims.places[end]]) for path, end in zip(paths, ends.tolist(), strict=True)]
-    return _fitted_closely(faces, rims, starts, ends, ways, size)
+    ways = [np.vstack([path[:-1], crossings.places[end]]) for path, end in zip(paths, ends.tolist(), strict=True)]
+    return _fitted_closely(faces, crossings, starts, ends, ways, size)
 
 
 def _require_open_curves(faces: Faces) -> None:
@@ -142,13 +142,13 @@ def _require_open_curves(faces: Faces) -> None:
         raise KernelError("a face of the lattice bulges through a side of the box")
 
 
-def _followed(faces: Faces, rims: Rims, starts: Integers, step: float) -> list[Floats]:
+def _followed(faces: Faces, crossings: EdgeCrossings, starts: Integers, step: float) -> list[Floats]:
     """Places along the curve from each start until it has left the square, the last one outside."""
-    place = rims.places[starts]
+    place = crossings.places[starts]
     paths = [[point] for point in place]
     live = np.arange(len(starts))
     for _ in range(int(_LONGEST / step)):
-        face, plane = rims.face[starts[live]], rims.plane[starts[live]]
+        face, plane = crossings.face[starts[live]], crossings.plane[starts[live]]
         onward = _along(faces, face, plane, place)
         place = place + step * _along(faces, face, plane, place + step / 2 * onward)
         for _ in range(2):
@@ -177,18 +177,18 @@ def _towards(height: Floats, slopes: Floats) -> Floats:
     return np.asarray(step * np.minimum(1.0, _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)))
 
 
-def _exits(rims: Rims, starts: Integers, paths: list[Floats], reach: float) -> Integers | None:
+def _exits(crossings: EdgeCrossings, starts: Integers, paths: list[Floats], reach: float) -> Integers | None:
     """The crossing at which each path leaves; None if they are not one for one."""
-    leaving = np.flatnonzero(~rims.entering)
+    leaving = np.flatnonzero(~crossings.entering)
     if len(leaving) != len(starts):
         return None
-    places = rims.places
+    places = crossings.places
     alike: dict[tuple[int, int], list[int]] = {}
     for index in leaving.tolist():
-        alike.setdefault((int(rims.face[index]), int(rims.plane[index])), []).append(index)
+        alike.setdefault((int(crossings.face[index]), int(crossings.plane[index])), []).append(index)
     ends = []
     for start, path in zip(starts.tolist(), paths, strict=True):
-        candidates = alike.get((int(rims.face[start]), int(rims.plane[start])), [])
+        candidates = alike.get((int(crossings.face[start]), int(crossings.plane[start])), [])
         if not candidates:
             return None
         distance = np.linalg.norm(places[candidates] - (path[-1] + path[-2]) / 2, axis=1)
@@ -200,10 +200,10 @@ def _exits(rims: Rims, starts: Integers, paths: list[Floats], reach: float) -> I
 
 
 def _fitted_closely(
-    faces: Faces, rims: Rims, starts: Integers, ends: Integers, ways: list[Floats], size: float
+    faces: Faces, crossings: EdgeCrossings, starts: Integers, ends: Integers, ways: list[Floats], size: float
 ) -> Sections:
     """Each curve with as few control points as keep the one in the square and the one in space together."""
-    face, plane = rims.face[starts], rims.plane[starts]
+    face, plane = crossings.face[starts], crossings.plane[starts]
     none = np.zeros((0, 3))
     found = Sections(face, plane, starts, ends, [none] * len(face), [none] * len(face), np.full(len(face), np.inf))
     left = np.arange(len(face))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.nurbs.roots import roots
 from gyroid_cad.nurbs.surface import gauss_points
-from gyroid_cad.trim.edge_crossings import PLANES, Faces, Rims, rim_crossings, square_points
+from gyroid_cad.trim.edge_crossings import PLANES, EdgeCrossings, Faces, edge_crossings, square_points
 from gyroid_cad.trim.loops import linked, nested
 from gyroid_cad.trim.sections import Sections, plane_sections
 
@@ -88,7 +88,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CutFace:
-    """What a box leaves of a face.
+    """A face trimmed to a box.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class CutFace:
         return int(self.sections.plane[self.curves[arc.curve]])
 
     def on_edge(self, node: Node, plane: int) -> bool:
-        """Whether a node lies on an edge of the box that is one of a plane's."""
+        """Tell whether a node lies on an edge of the box that is one of a plane's."""
         return plane in self.edges.get(node, ())
 
     def bulge(self, arc: Arc, x: int, y: int) -> float:
@@ -155,22 +155,22 @@ def cut_faces(faces: Faces, size: float) -> list[CutFace]:
     cut = []
     for first in range(0, len(faces), _CHUNK):
         chunk = faces.chunk(first, _CHUNK)
-        rims = rim_crossings(chunk)
-        cut += _Cutting(chunk, rims, plane_sections(chunk, rims, size)).run()
+        crossings = edge_crossings(chunk)
+        cut += _Cutting(chunk, crossings, plane_sections(chunk, crossings, size)).run()
     return cut
 
 
 class _Cutting:
     """Some faces, where their sides cross the planes, and their section curves."""
 
-    def __init__(self, faces: Faces, rims: Rims, sections: Sections) -> None:
-        self.faces, self.rims, self.sections = faces, rims, sections
+    def __init__(self, faces: Faces, crossings: EdgeCrossings, sections: Sections) -> None:
+        self.faces, self.crossings, self.sections = faces, crossings, sections
         self.curves: list[list[int]] = [[] for _ in range(len(faces))]
         for curve, face in enumerate(sections.face.tolist()):
             self.curves[face].append(curve)
-        self.crossings: list[list[int]] = [[] for _ in range(len(faces))]
-        for crossing, face in enumerate(rims.face.tolist()):
-            self.crossings[face].append(crossing)
+        self.crossings_of: list[list[int]] = [[] for _ in range(len(faces))]
+        for crossing, face in enumerate(crossings.face.tolist()):
+            self.crossings_of[face].append(crossing)
 
     def run(self) -> list[CutFace]:
         quadrature = SquareQuadrature(self.faces.knots)
@@ -183,7 +183,7 @@ class _Cutting:
             pieces = [
                 self._measured(curves, loops, quadrature, densities[face]) for loops in self._pieces(curves, kept)
             ]
-            crossings = np.bincount(self.rims.side[self.crossings[face]], minlength=4).tolist()
+            crossings = np.bincount(self.crossings.side[self.crossings_of[face]], minlength=4).tolist()
             for arc in kept:
                 if arc.curve >= 0:
                     # Ends that are none on an edge of the box are the curve's own.
@@ -196,7 +196,7 @@ class _Cutting:
     def _edge_points(
         self, curves: list[int]
     ) -> tuple[dict[Node, Floats], dict[Node, tuple[int, int]], list[list[tuple[float, int]]]]:
-        """Where section curves of one face cross each other, on an edge of the box.
+        """Points where section curves of one face cross each other, on an edge of the box.
 
         Their points; the planes that meet there; and for each curve the parameters and numbers of those on it.
         """
@@ -221,7 +221,7 @@ class _Cutting:
 
     @staticmethod
     def _number_near(place: Floats, places: list[Floats], alike: list[bool]) -> int:
-        """Which of the places a place is, found a second time from the other curve through it; or a new number."""
+        """Number of a point that was found before from the other curve through it; or a new number."""
         for number, (other, same) in enumerate(zip(places, alike, strict=True)):
             if same and np.linalg.norm(other - place) < _SAME_PLACE:
                 return number
@@ -253,12 +253,12 @@ class _Cutting:
         arcs = []
         node_of: dict[int, Node] = {}
         for side in range(4):
-            crossings = [k for k in self.crossings[face] if self.rims.side[k] == side]
-            node_of |= {k: (RIM, side, before) for before, k in enumerate(crossings)}
-            stops = [-1.0, *self.rims.along[crossings].tolist(), 1.0]
+            found = [k for k in self.crossings_of[face] if self.crossings.side[k] == side]
+            node_of |= {k: (RIM, side, before) for before, k in enumerate(found)}
+            stops = [-1.0, *self.crossings.along[found].tolist(), 1.0]
             nodes: list[Node] = [
                 (CORNER, side, 0),
-                *(node_of[k] for k in crossings),
+                *(node_of[k] for k in found),
                 (CORNER, (side + 1) % 4, 0),
             ]
             arcs += _stretches(side, -1, stops, nodes)

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.graph import connected
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, placed_corners
 
-__all__ = ["CellComplex", "build_complex", "connected"]
+__all__ = ["CellComplex", "build_complex"]
 
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
@@ -92,18 +93,18 @@ class CellComplex:
 
     @property
     def free(self) -> Booleans:
-        """Which edges bound one patch only; shape (edges,)."""
+        """Mask of the edges that bound one patch only; shape (edges,)."""
         return np.asarray(self.edge_patches[:, 1] == _NO_PATCH)
 
     @property
     def border_fans(self) -> Booleans:
-        """Which fans do not close round their corner; shape (fans,)."""
+        """Mask of the fans that do not close round their corner; shape (fans,)."""
         border = np.zeros(self.fan_count, dtype=bool)
         border[self.edge_fans[self.free].ravel()] = True
         return border
 
     @property
-    def pinch_lines(self) -> int:
+    def non_manifold_edges(self) -> int:
         """Corners at which more than one fan meets: lines through the wall where patches touch without joining."""
         return int(np.sum(np.bincount(self.fan_corner) > 1))
 
@@ -225,20 +226,3 @@ def _fans(
     fan_corner = np.empty(labels.max() + 1, dtype=np.int64)
     fan_corner[labels] = patch_corners.ravel()
     return labels.reshape(-1, 4), fan_corner
-
-
-def connected(count: int, first: Integers, second: Integers) -> Integers:
-    """Label the connected components of a graph on ``count`` nodes, from 0; shape (count,).
-
-    Every node takes its neighbours' lowest label until none changes. ``scipy.sparse.csgraph`` does the same,
-    but importing it takes longer than all else here.
-    """
-    label = np.arange(count)
-    while np.any(label[first] != label[second]):
-        lowest = np.minimum(label[first], label[second])
-        # A label is a node: hooking labels, not only nodes, joins whole components at once.
-        for ends in (first, second):
-            np.minimum.at(label, label[ends], lowest)
-            np.minimum.at(label, ends, lowest)
-        label = label[label]
-    return np.unique(label, return_inverse=True)[1].astype(np.int64)

@@ -1,6 +1,6 @@
 """The patches of an endless lattice that a part needs: where they are, and which the part's boundary crosses.
 
-Patches wholly inside or outside the part need no cutting. Those that the boundary stays clear of hang together by
+Patches wholly inside or outside the part need no cutting. Those that the boundary stays clear of are connected by
 their edges, and each such group is all inside or all outside: one point tells.
 """
 
@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
-from gyroid_cad.wall.complex import CellComplex, build_complex, connected
-from gyroid_cad.wall.exact import laid_patches, patch_points, patch_points_and_normals
+from gyroid_cad.wall.complex import CellComplex, build_complex
+from gyroid_cad.wall.exact import offset_patches, patch_points, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 
 __all__ = [
@@ -23,7 +24,7 @@ __all__ = [
     "CROSSING",
     "INSIDE",
     "OUTSIDE",
-    "PHASES",
+    "PERTURBATIONS",
     "SIDE_SAMPLES",
     "Frame",
     "covering_complex",
@@ -43,13 +44,13 @@ OUTSIDE, CROSSING, INSIDE = -1, 0, 1
 SIDE_SAMPLES = 7
 # Of the lattice, in cell sizes: tangent or nearly coincident faces cannot be cut; a shift that no symmetry knows parts
 # them.
-PHASES = ((0.0, 0.0, 0.0), (0.0031, 0.0047, 0.0023), (-0.0053, 0.0029, 0.0071))
+PERTURBATIONS = ((0.0, 0.0, 0.0), (0.0031, 0.0047, 0.0023), (-0.0053, 0.0029, 0.0071))
 _OFFSET_SAMPLES = 17
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """Where the lattice stands: p -> rotation p + origin, from its own space to that of the part.
+    """Frame of a lattice: p -> rotation p + origin, from its own space to that of the part.
 
     Attributes
     ----------
@@ -107,7 +108,7 @@ def covering_complex(
 
 
 def _patch_radius(placements: Placements) -> float:
-    """From the middle of a patch to its corners, which are furthest from it, in cell sizes."""
+    """Radius of a patch, from its middle to its corners, which are furthest from it, in cell sizes."""
     return float(np.linalg.norm(placements.patch.corner_array, axis=1).max()) / CELL_QUARTERS
 
 
@@ -115,9 +116,9 @@ def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> 
     """The thinnest and the thickest wall of patches that may come near a box in the part's space, in mm."""
     if grading.uniform:
         return float(grading.thickness), float(grading.thickness)  # type: ignore[arg-type]
-    reach = grading.surface.tube.largest_thickness / 2 * grading.cell_size
+    reach = grading.surface.tube.max_thickness / 2 * grading.cell_size
     complex = covering_complex(low, high, frame, grading.cell_size, reach, grading.surface)
-    walls = [laid.thickness for _, laid in laid_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES))]
+    walls = [fitted.thickness for _, fitted in offset_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES))]
     return min(float(some.min()) for some in walls), max(float(some.max()) for some in walls)
 
 
@@ -127,9 +128,9 @@ def patch_sides(
     cell_size: float,
     reach: float,
     distance: Callable[[Floats], Floats],
-    holds: Callable[[Floats], Booleans],
+    contains: Callable[[Floats], Booleans],
 ) -> Integers:
-    """Which patches lie inside a part, outside it, or may be crossed by its boundary; shape (patches,).
+    """Sort patches by whether they lie inside a part, outside it, or may be crossed by its boundary; shape (patches,).
 
     Parameters
     ----------
@@ -139,11 +140,11 @@ def patch_sides(
         In mm.
     distance : callable
         Of points (n, 3) in the part's space: no more than their distance from its boundary, in mm.
-    holds : callable
+    contains : callable
         Which of some points lie inside the part.
     """
     points = frame.placed(patch_points(complex, cell_size, np.linspace(-1, 1, SIDE_SAMPLES)))
-    return sides_of_points(complex, points, reach, distance, holds)
+    return sides_of_points(complex, points, reach, distance, contains)
 
 
 def sides_of_points(
@@ -151,9 +152,9 @@ def sides_of_points(
     points: Floats,
     reach: float,
     distance: Callable[[Floats], Floats],
-    holds: Callable[[Floats], Booleans],
+    contains: Callable[[Floats], Booleans],
 ) -> Integers:
-    """The same, of patches wherever they lie; shape (patches,).
+    """Sort patches, wherever they lie, as :func:`patch_sides` does; shape (patches,).
 
     Parameters
     ----------
@@ -162,7 +163,7 @@ def sides_of_points(
         Of the mid-surface, on a grid, in mm.
     reach : float
         In mm.
-    distance, holds : callable
+    distance, contains : callable
         As of :func:`patch_sides`.
     """
     # Every place of a patch is within half a step between samples, along both sides, of one of them.
@@ -180,13 +181,13 @@ def sides_of_points(
     group = connected(complex.patch_count, both[:, 0], both[:, 1])
     groups, first = np.unique(group[clear], return_index=True)
     inside = np.zeros(complex.patch_count, dtype=bool)
-    inside[groups] = holds(middle[np.flatnonzero(clear)[first]])
+    inside[groups] = contains(middle[np.flatnonzero(clear)[first]])
     sides[clear] = np.where(inside[group[clear]], INSIDE, OUTSIDE)
     return sides
 
 
 def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: MinimalSurface = USUAL) -> Floats:
-    """How far points of the part's space lie from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
+    """Distance of the part's points from the endless mid-surface, along its normal, to about 1e-3 cell sizes.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: Mi
 
 
 def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
-    """How far points lie from samples of a surface, along its normal.
+    """Distance of points from samples of a surface, along its normal.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The exact wall of a lattice that varies, without any fit: where it is, and its volume."""
+"""The exact wall of a graded lattice, without any fit: where it is, and its volume."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.surface.weierstrass import Family
 from gyroid_cad.wall.complex import CellComplex
-from gyroid_cad.wall.grading import Grading, Laid
+from gyroid_cad.wall.grading import Grading, WallPoints
 
 __all__ = [
     "ExactMeasures",
@@ -21,10 +21,10 @@ __all__ = [
     "differentiation_matrix",
     "exact_measures",
     "interpolation_matrix",
-    "laid_patches",
+    "offset_patches",
     "patch_points",
     "patch_points_and_normals",
-    "sampled_place",
+    "sampled_point",
 ]
 
 Floats = NDArray[np.float64]
@@ -36,9 +36,9 @@ _BLOCK_POINTS = 4
 _PATCHES_AT_ONCE = 48
 
 
-def laid_patches(
+def offset_patches(
     complex: CellComplex, grading: Grading, samples: Floats, patches: Integers | None = None
-) -> Iterator[tuple[slice, Laid]]:
+) -> Iterator[tuple[slice, WallPoints]]:
     """The exact mid-surface at a grid of samples of every patch, some patches at a time.
 
     Parameters
@@ -72,16 +72,16 @@ def patch_points(complex: CellComplex, cell_size: float, samples: Floats) -> Flo
 
 
 def patch_points_and_normals(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
-    """The same, and the unit normals on the common side, of the same shape."""
+    """Points of patches, and the unit normals on the common side, of the same shape."""
     points, normals = _placed_grid(complex, cell_size, samples)
     corners = (complex.patch_cell * cell_size)[:, np.newaxis]
     return points[complex.patch_placement] + corners, normals[complex.patch_placement]
 
 
-def sampled_place(
+def sampled_point(
     complex: CellComplex, cell_size: float, samples: Floats, patch: int, index: int
 ) -> tuple[float, float, float]:
-    """Where, in mm and before any map, the sample of a patch is that has a flat index in its grid."""
+    """Place, in mm and before any map, of a patch's sample that has a flat index in its grid."""
     points, _ = _placed_grid(complex, cell_size, samples)
     x, y, z = points[complex.patch_placement[patch], index] + complex.patch_cell[patch] * cell_size
     return float(x), float(y), float(z)
@@ -105,7 +105,7 @@ def _exact_grid(samples: tuple[float, ...], family: Family) -> tuple[Floats, Flo
 
 @dataclass(frozen=True, slots=True)
 class ExactMeasures:
-    """Of the exact wall.
+    """Measures of the exact wall.
 
     Attributes
     ----------
@@ -140,17 +140,17 @@ def exact_measures(complex: CellComplex, grading: Grading) -> ExactMeasures:
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
     rate = differentiation_matrix(nodes)
     totals = np.zeros(3)
-    for _, laid in laid_patches(complex, grading, nodes):
+    for _, fitted in offset_patches(complex, grading, nodes):
         shape = (-1, len(nodes), len(nodes), 3)
-        middle = laid.points.reshape(shape)
-        half = (laid.normals * (laid.thickness / 2)[:, np.newaxis]).reshape(shape)
+        middle = fitted.points.reshape(shape)
+        half = (fitted.normals * (fitted.thickness / 2)[:, np.newaxis]).reshape(shape)
         middle_u, half_u = (np.einsum("ab,pbvc->pavc", rate, a) for a in (middle, half))
         middle_v, half_v = (np.einsum("ab,pubc->puac", rate, a) for a in (middle, half))
         # The integral over s from -1 to 1 of (M_u + s H_u) x (M_v + s H_v) . H.
         flat = np.cross(middle_u, middle_v)
         volumes = np.einsum("puvc,puvc->puv", 2 * flat + 2 / 3 * np.cross(half_u, half_v), half)
         areas = np.linalg.norm(flat, axis=-1)
-        integrands = np.stack([volumes, areas, areas * laid.thickness.reshape(areas.shape)])
+        integrands = np.stack([volumes, areas, areas * fitted.thickness.reshape(areas.shape)])
         totals += np.einsum("u,v,ipuv->i", weights, weights, integrands)
     volume, area, thickness = totals.tolist()
     return ExactMeasures(volume, area, thickness / area)
@@ -170,7 +170,7 @@ def block_volume(cells: tuple[int, int, int], grading: Grading) -> float:
 
     Raises
     ------
-    SoundnessError
+    SelfIntersectionError
         If the determinant is not positive all over the block.
     """
     nodes, weights = np.polynomial.legendre.leggauss(_BLOCK_POINTS)

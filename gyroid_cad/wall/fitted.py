@@ -1,25 +1,81 @@
-"""From the description of a lattice to its wall, stage by stage, timed: all that comes before a solid or a mesh."""
+"""A lattice's wall, fitted from its description, stage by stage, timed: all that comes before a solid or a mesh."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.cache import Remembered
+from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.memory import require_memory
-from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.common.progress import Progress, Timed, timed
+from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.covering import AT_HOME, PHASES, covering_complex, wall_extremes
-from gyroid_cad.wall.graded_fit import fit_wall
+from gyroid_cad.wall.covering import AT_HOME, PERTURBATIONS, covering_complex, wall_extremes
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.offset import Wall
-from gyroid_cad.wall.refit import Refit
-from gyroid_cad.wall.self_intersection import CLEARANCE_SAMPLES, FOLD_SAMPLES
+from gyroid_cad.wall.offset import Wall, build_wall
+from gyroid_cad.wall.refit import Refit, graded_wall, likely_control_points, measured
+from gyroid_cad.wall.self_intersection import CLEARANCE_SAMPLES, FOLD_SAMPLES, require_simple, require_simple_fit
 
-__all__ = ["LaidWall", "Recipe", "laid_wall", "lay_wall"]
+__all__ = ["FittedWall", "LatticeSpec", "fit_spec", "fit_wall", "fitted_wall"]
+
+
+def fit_wall(
+    complex: CellComplex,
+    grading: Grading,
+    settings: FitSettings,
+    tolerance: float,
+    timed: Timed,
+    allow: Callable[[int], None] = lambda control_points: None,
+) -> tuple[Wall, Refit | None]:
+    """Fit the wall; where it varies, check that it can exist, and fit until it is as close as asked for.
+
+    Parameters
+    ----------
+    complex : CellComplex
+    grading : Grading
+    settings : FitSettings
+    tolerance : float
+        Largest deviation of a graded wall, in cell sizes.
+    timed : callable
+        A context for each stage, by its name.
+    allow : callable, optional
+        Called with each number of control points before it is tried: may refuse it.
+
+    Returns
+    -------
+    Wall
+    Refit
+        What the fit is worth; None where it is uniform.
+
+    Raises
+    ------
+    ParameterError, SelfIntersectionError, FitError
+    """
+    if grading.uniform:
+        with timed("fit"):
+            patch = fit_patch(settings, grading.surface.family)
+        with timed("wall"):
+            return build_wall(complex, patch, grading.cell_size, float(grading.thickness)), None  # type: ignore[arg-type]
+    with timed("soundness"):
+        require_simple(complex, grading)
+    with timed("deviation"):
+        wanted = likely_control_points(complex, grading, settings.control_points, tolerance)
+    n = 0
+    while n != wanted:
+        n = wanted
+        allow(n)
+        with timed("fit"):
+            wall = graded_wall(complex, grading, n)
+        with timed("deviation"):
+            refit = measured(wall.nets, complex, grading)
+        wanted = refit.control_points_for(tolerance, grading.cell_size)
+    with timed("soundness"):
+        require_simple_fit(wall, grading)
+    return wall, refit
+
 
 Floats = NDArray[np.float64]
 
@@ -27,12 +83,12 @@ Floats = NDArray[np.float64]
 _BYTES_PER_CELL = 500_000
 # Of whole cells that are all alike: they have their nets in common, only the complex grows; writing STL included.
 _BYTES_PER_ALIKE_CELL = 40_000
-_SHIFTS = float(np.abs(PHASES).max())
+_SHIFTS = float(np.abs(PERTURBATIONS).max())
 
 
 @dataclass(frozen=True, slots=True)
-class Recipe:
-    """What to build.
+class LatticeSpec:
+    """Description of a lattice to be built.
 
     Attributes
     ----------
@@ -40,8 +96,8 @@ class Recipe:
     grading : Grading
     settings : FitSettings
     tolerance : float
-        Largest deviation of a wall that varies, in cell sizes; one that does not is fitted as the settings say.
-    boxed : bool
+        Largest deviation of a graded wall, in cell sizes; one that does not is fitted as the settings say.
+    trimmed : bool
         Whether it is cut to the block of cells.
     """
 
@@ -49,60 +105,60 @@ class Recipe:
     grading: Grading
     settings: FitSettings
     tolerance: float
-    boxed: bool = False
+    trimmed: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaidWall:
+class FittedWall:
     """The wall of a lattice, fitted and found sound.
 
     Attributes
     ----------
-    recipe : Recipe
+    spec : LatticeSpec
     complex : CellComplex
     wall : Wall
     refit : Refit, optional
-        What the fit is worth, of a wall that varies.
+        What the fit is worth, of a graded wall.
     seconds : dict
         By stage.
     """
 
-    recipe: Recipe
+    spec: LatticeSpec
     complex: CellComplex
     wall: Wall
     refit: Refit | None
     seconds: dict[str, float]
 
     @property
-    def thinnest(self) -> float:
+    def min_thickness(self) -> float:
         """The thinnest wall, in mm."""
-        return float(self.recipe.grading.thickness) if self.refit is None else self.refit.thinnest  # type: ignore[arg-type]
+        return float(self.spec.grading.thickness) if self.refit is None else self.refit.min_thickness  # type: ignore[arg-type]
 
     @property
-    def thickest(self) -> float:
+    def max_thickness(self) -> float:
         """The thickest wall, in mm."""
-        return float(self.recipe.grading.thickness) if self.refit is None else self.refit.thickest  # type: ignore[arg-type]
+        return float(self.spec.grading.thickness) if self.refit is None else self.refit.max_thickness  # type: ignore[arg-type]
 
     @property
     def samples_per_patch(self) -> dict[str, int]:
-        """At how many places of every patch a wall that varies was checked, by what for."""
+        """At how many places of every patch a graded wall was checked, by what for."""
         if self.refit is None:
             return {}
         return {"deviation": self.refit.samples**2, "fold": FOLD_SAMPLES**2, "clearance": CLEARANCE_SAMPLES**2}
 
     def bounding_box(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner of the box round the wall, or of the block it is to be cut to, in mm."""
-        if self.recipe.boxed:
-            return np.zeros(3), np.array(self.recipe.cells) * self.recipe.grading.cell_size
+        if self.spec.trimmed:
+            return np.zeros(3), np.array(self.spec.cells) * self.spec.grading.cell_size
         return self.wall.bounding_box()
 
 
-def lay_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
+def fit_spec(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
     """Fit the wall of a lattice and check that it can exist.
 
     Parameters
     ----------
-    recipe : Recipe
+    spec : LatticeSpec
     progress : callable, optional
         Called with (stage, done, total).
 
@@ -110,44 +166,44 @@ def lay_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
     ------
     ParameterError
         If memory would not do, saying how much it would take.
-    SoundnessError
-        If a wall that varies cannot exist somewhere.
+    SelfIntersectionError
+        If a graded wall cannot exist somewhere.
     FitError
         If the fit's edges do not meet those of its neighbours.
     """
-    alike = recipe.grading.uniform and not recipe.boxed
+    alike = spec.grading.uniform and not spec.trimmed
     require_memory(
-        recipe.cells,
+        spec.cells,
         _BYTES_PER_ALIKE_CELL if alike else _BYTES_PER_CELL,
-        10 if alike else recipe.settings.control_points,
+        10 if alike else spec.settings.control_points,
         kernel=False,
     )
     seconds: dict[str, float] = {}
     with timed(seconds, "complex", progress):
-        complex = _complex(recipe)
+        complex = _complex(spec)
     wall, refit = fit_wall(
         complex,
-        recipe.grading,
-        recipe.settings,
-        recipe.tolerance,
+        spec.grading,
+        spec.settings,
+        spec.tolerance,
         lambda stage: timed(seconds, stage, progress),
-        lambda control_points: require_memory(recipe.cells, _BYTES_PER_CELL, control_points, kernel=False),
+        lambda control_points: require_memory(spec.cells, _BYTES_PER_CELL, control_points, kernel=False),
     )
-    return LaidWall(recipe, complex, wall, refit, seconds)
+    return FittedWall(spec, complex, wall, refit, seconds)
 
 
-_laid: Remembered[Recipe, LaidWall] = Remembered()
+_fitted: Cache[LatticeSpec, FittedWall] = Cache()
 
 
-def laid_wall(recipe: Recipe, progress: Progress | None = None) -> LaidWall:
-    """The same; the last few are remembered."""
-    return _laid.get(recipe, lambda: lay_wall(recipe, progress))
+def fitted_wall(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
+    """Fit and check the wall of a lattice, as :func:`fit_spec` does; the last few are cached."""
+    return _fitted.get(spec, lambda: fit_spec(spec, progress))
 
 
-def _complex(recipe: Recipe) -> CellComplex:
-    grading = recipe.grading
-    if not recipe.boxed:
-        return build_complex(recipe.cells, grading.surface.cell, grading.closed)
-    low, high = np.zeros(3), np.array(recipe.cells) * grading.cell_size
+def _complex(spec: LatticeSpec) -> CellComplex:
+    grading = spec.grading
+    if not spec.trimmed:
+        return build_complex(spec.cells, grading.surface.cell, grading.closed)
+    low, high = np.zeros(3), np.array(spec.cells) * grading.cell_size
     reach = wall_extremes(low, high, AT_HOME, grading)[1] / 2 + _SHIFTS * grading.cell_size
     return covering_complex(low, high, AT_HOME, grading.cell_size, reach, grading.surface)

@@ -1,4 +1,4 @@
-"""What varies over a lattice: wall, cell size, and the space it is carried to.
+"""Grading of a lattice: its wall, cell size, and the space it is carried to.
 
 All fields are functions of the place in the lattice's own flat space, in mm, before any map. First the scale field
 s carries a point p to s(p) p, the paper's variable bounding-cell length; then the map of space carries on.
@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import cross
-from gyroid_cad.errors import SoundnessError
+from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field, evaluated, given_as
 from gyroid_cad.maps.space import OPEN, SpaceMap, carried, differences
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 
-__all__ = ["THINNEST_WALL", "Grading", "Laid"]
+__all__ = ["THINNEST_WALL", "Grading", "WallPoints"]
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ THINNEST_WALL = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Laid:
+class WallPoints:
     """The mid-surface where it is wanted.
 
     Attributes
@@ -49,7 +49,7 @@ class Laid:
 
 @dataclass(frozen=True, slots=True)
 class Grading:
-    """How the wall and the space vary.
+    """Grading of the wall and the space.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Grading:
 
     @property
     def uniform(self) -> bool:
-        """Whether every cell is like every other: a constant wall in flat space."""
+        """True where every cell is like every other: a constant wall in flat space."""
         return not isinstance(self.thickness, Field | None) and self.scale_field is None and self.map is None
 
     @property
@@ -88,7 +88,7 @@ class Grading:
         """Along which axes the block's ends are joined; a scale would part them again."""
         return OPEN if self.scale_field is not None else self.map_closes
 
-    def lay(self, points: Floats, normals: Floats) -> Laid:
+    def lay(self, points: Floats, normals: Floats) -> WallPoints:
         """Carry points of the mid-surface and their normals to where they are wanted.
 
         Parameters
@@ -104,15 +104,15 @@ class Grading:
         ------
         ParameterError
             If a field or the map gives something else than finite real numbers.
-        SoundnessError
+        SelfIntersectionError
             If the map turns space inside out, or a thickness or density is outside its range.
         """
         images, jacobian, determinant = self.carry(points)
         if jacobian is None:
-            return Laid(points, normals, self._thickness(points, 1.0))
+            return WallPoints(points, normals, self._thickness(points, 1.0))
         turned = _turned(jacobian, np.ascontiguousarray(normals.T))
         growth = np.sqrt(np.sum(turned * turned, axis=0))
-        return Laid(images.T, (turned / growth).T, self._thickness(points, determinant / growth))
+        return WallPoints(images.T, (turned / growth).T, self._thickness(points, determinant / growth))
 
     def carry(self, points: Floats) -> tuple[Floats, Floats | None, Floats | float]:
         """Images of points, and the Jacobian and its determinant there, component first.
@@ -132,7 +132,7 @@ class Grading:
         Raises
         ------
         ParameterError
-        SoundnessError
+        SelfIntersectionError
             If the determinant is not positive everywhere.
         """
         images = np.ascontiguousarray(points.T)
@@ -163,13 +163,13 @@ class Grading:
             jacobian[axis, axis] += factor
         return factor * places, jacobian
 
-    def asked(self, points: Floats) -> Floats:
+    def requested(self, points: Floats) -> Floats:
         """The thickness in mm, or the density, asked for at points of the lattice's own space; shape (n,).
 
         Raises
         ------
         ParameterError
-        SoundnessError
+        SelfIntersectionError
             If it is not positive everywhere, or a density past the largest.
         """
         value = self.thickness if self.density is None else self.density
@@ -180,19 +180,19 @@ class Grading:
             return values
         _require(parameter, values, points, 0.0, "above", "everywhere in the lattice")
         worst = int(np.argmax(values))
-        largest = self.surface.tube.largest_density
+        largest = self.surface.tube.max_density
         if values[worst] >= largest:
             reason = "the density at which the wall meets itself"
-            raise SoundnessError(parameter, float(values[worst]), _place(points, worst), largest, reason)
+            raise SelfIntersectionError(parameter, float(values[worst]), _place(points, worst), largest, reason)
         return values
 
     def _thickness(self, points: Floats, spacing: Floats | float) -> Floats:
-        asked = self.asked(points)
+        requested = self.requested(points)
         if self.density is None:
-            return asked
+            return requested
         # The wall is stretched with the space across it, as if it had been mapped itself: so the volume
         # fraction is kept, to first order in the thickness, however the map stretches.
-        thickness = np.asarray(self.surface.tube.thickness(asked) * self.cell_size * spacing)
+        thickness = np.asarray(self.surface.tube.thickness(requested) * self.cell_size * spacing)
         _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall", "thickness", " mm")
         return thickness
 
@@ -231,7 +231,7 @@ def _require(
     worst = int(np.argmin(values))
     if not (values[worst] > limit or (accepted == "at least" and values[worst] == limit)):
         place = _place(points, worst)
-        raise SoundnessError(parameter, float(values[worst]), place, limit, reason, accepted, quantity, unit)
+        raise SelfIntersectionError(parameter, float(values[worst]), place, limit, reason, accepted, quantity, unit)
 
 
 def _place(points: Floats, index: int) -> tuple[float, float, float]:

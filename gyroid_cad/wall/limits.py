@@ -1,4 +1,4 @@
-"""What a lattice may be: how many cells, of what size, with what wall."""
+"""Limits of a lattice: how many cells, of what size, with what wall."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numbers import Integral
 
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.surface.tube import TubeLaw
+from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import THINNEST_WALL
 
 __all__ = [
@@ -15,7 +15,7 @@ __all__ = [
     "require_density",
     "require_one",
     "require_thickness",
-    "sound_tolerance",
+    "valid_tolerance",
     "whole_cells",
 ]
 
@@ -42,13 +42,13 @@ def require_thickness(thickness: float, cell_size: float, tube: TubeLaw) -> None
     ------
     ParameterError
     """
-    limit = tube.largest_thickness * cell_size
+    limit = tube.max_thickness * cell_size
     if not THINNEST_WALL <= thickness < limit:
         raise ParameterError(
             "thickness",
             thickness,
             f"{THINNEST_WALL:g} mm or more and below {limit:.5g} mm, "
-            f"the curvature limit {tube.largest_thickness:.5f} x cell_size",
+            f"the curvature limit {tube.max_thickness:.5f} x cell_size",
         )
 
 
@@ -59,13 +59,13 @@ def require_density(density: float, cell_size: float, tube: TubeLaw) -> None:
     ------
     ParameterError
     """
-    if not 0 < density < tube.largest_density:
+    if not 0 < density < tube.max_density:
         raise ParameterError(
-            "density", density, f"above 0 and below {tube.largest_density:.5f}, where the wall meets itself"
+            "density", density, f"above 0 and below {tube.max_density:.5f}, where the wall meets itself"
         )
     if tube.thickness(density) * cell_size < THINNEST_WALL:
-        thinnest = tube.density(THINNEST_WALL / cell_size)
-        raise ParameterError("density", density, f"at least {thinnest:.3g} (a wall of {THINNEST_WALL} mm)")
+        min_thickness = tube.density(THINNEST_WALL / cell_size)
+        raise ParameterError("density", density, f"at least {min_thickness:.3g} (a wall of {THINNEST_WALL} mm)")
 
 
 def require_one(thickness: object, density: object) -> None:
@@ -80,7 +80,7 @@ def require_one(thickness: object, density: object) -> None:
         raise ParameterError("thickness, density", given, "exactly one of the two")
 
 
-def sound_tolerance(tolerance: float) -> float:
+def valid_tolerance(tolerance: float) -> float:
     """The largest deviation of a fit, in cell sizes.
 
     Raises

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, grid_derivatives
-from gyroid_cad.surface.fit import FittedPatch, largest_offset, require_shared_edges
+from gyroid_cad.surface.fit import FittedPatch, max_offset, require_shared_edges
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex
 
@@ -137,7 +137,7 @@ def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thick
     """
     require_shared_edges(patch)
     bounding_cell_length = cell_size / 2
-    limit = 2 * largest_offset(patch) * bounding_cell_length
+    limit = 2 * max_offset(patch) * bounding_cell_length
     if not thickness < limit:
         raise ParameterError(
             "thickness",

@@ -1,6 +1,6 @@
-"""How large a sphere passes through a lattice's channels, from the exact surface by distance.
+"""Pore limiting diameters: the largest spheres that pass through a lattice's channels.
 
-A labyrinth's throats are where the largest sphere that can travel through it without end is held: the places with the
+A network's throats are where the largest sphere that can travel through it without end is held: the places with the
 greatest least distance from the mid-surface along a path (the pore-limiting diameter of porous media). A wall's face
 lies half the wall off the mid-surface along its normals, so the sphere's diameter falls by exactly the wall's
 thickness.
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.graph import runs_on
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.patch import smooth
@@ -25,7 +26,7 @@ from gyroid_cad.wall.exact import patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import SIDES, Wall
 
-__all__ = ["Throats", "labyrinth_throats", "narrowest_opening", "throat_diameter"]
+__all__ = ["PoreLimits", "narrowest_opening", "network_throats", "pore_limiting_diameter"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,7 +35,7 @@ Booleans = NDArray[np.bool_]
 # Nodes along a cell. Throats lie where symmetries of the surface leave points fixed, which are eighths of the cell; and
 # the channels of all three surfaces run along edges and diagonals of the grid, along which its nodes are joined.
 _NODES = 16
-# Samples along a patch's side: of the mid-surface, and of the faces of a wall that varies.
+# Samples along a patch's side: of the mid-surface, and of the faces of a graded wall.
 _EXACT_SAMPLES, _FACE_SAMPLES = 25, 9
 # Nodes whose distances agree so closely, in cell sizes, lie equally far: symmetric ones do, to rounding.
 _EQUALLY_FAR = 1e-9
@@ -43,20 +44,22 @@ _CLOSER_SAMPLES, _CLOSEST, _NO_NEARER = 17, 1e-8, 1e-14
 # Distances to samples that may yet turn out the least, as a part of the least; and how many are looked at closely.
 _MAY_BE_LEAST, _LOOKED_AT = 1.05, 64
 _PATCHES_AT_ONCE = 4_000
+# Of the 26 steps to the next nodes, across diagonals too, one of each two that are opposite.
+_ONWARD = np.array([step for step in np.ndindex(3, 3, 3) if step > (1, 1, 1)]) - 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Throats:
-    """The throats of a surface's two labyrinths.
+class PoreLimits:
+    """The throats of a surface's two networks.
 
     Attributes
     ----------
     centres : ndarray, shape (n, 3)
         Of one cell, in cell sizes, within [0, 1).
     above : ndarray of bool, shape (n,)
-        Whether they lie in the labyrinth that the common normal points to.
+        Whether they lie in the network that the common normal points to.
     radius : float
-        Distance from the mid-surface, in cell sizes: the less of the two labyrinths'.
+        Distance from the mid-surface, in cell sizes: the less of the two networks'.
     """
 
     centres: Floats
@@ -67,8 +70,8 @@ class Throats:
         freeze_arrays(self)
 
 
-def throat_diameter(surface: MinimalSurface, cell_size: float, thickness: float) -> float:
-    """Diameter of the largest sphere that can pass through both labyrinths beside a constant wall, in mm.
+def pore_limiting_diameter(surface: MinimalSurface, cell_size: float, thickness: float) -> float:
+    """Diameter of the largest sphere that can pass through both networks beside a constant wall, in mm.
 
     Parameters
     ----------
@@ -76,12 +79,12 @@ def throat_diameter(surface: MinimalSurface, cell_size: float, thickness: float)
     cell_size, thickness : float
         In mm.
     """
-    return 2 * labyrinth_throats(surface).radius * cell_size - thickness
+    return 2 * network_throats(surface).radius * cell_size - thickness
 
 
 @lru_cache(maxsize=8)
-def labyrinth_throats(surface: MinimalSurface) -> Throats:
-    """Where a surface's labyrinths are narrowest for what travels through them.
+def network_throats(surface: MinimalSurface) -> PoreLimits:
+    """Throats of a surface's networks, where they are narrowest for what travels through them.
 
     A grid is flooded from the places furthest from the surface until the flood runs through the cell without end; the
     node that joins it is the throat, and its distance is then worked out to rounding from the exact surface.
@@ -115,11 +118,11 @@ def labyrinth_throats(surface: MinimalSurface) -> Throats:
         own = 2 * (nodes[at[0]] - middle - complex.patch_cell[patch]) @ turn
         radii.append(_least_distance(exact, own) / 2)
     every = np.concatenate(chosen)
-    return Throats(nodes[every], above[every], min(radii))
+    return PoreLimits(nodes[every], above[every], min(radii))
 
 
 def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int]) -> float:
-    """Diameter of the largest sphere about the throats' centres of a lattice that varies, in mm.
+    """Diameter of the largest sphere about the throats' centres of a graded lattice, in mm.
 
     The centres are carried along with space. Where a wall or a map is lopsided a sphere somewhat larger passes beside
     the centre: so this is on the safe side. Distances are measured to the nets' own faces.
@@ -134,7 +137,7 @@ def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int])
     -------
     float
     """
-    centres = _throats_of_block(labyrinth_throats(grading.surface).centres, cells) * grading.cell_size
+    centres = _throats_of_block(network_throats(grading.surface).centres, cells) * grading.cell_size
     images = grading.carry(centres)[0].T
     distance, patch = _to_faces(wall, images)
     least = float(distance.min())
@@ -210,36 +213,15 @@ def _held(distance: Floats) -> float:
 
 
 def _endless(filled: Booleans) -> bool:
-    """Whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images elsewhere."""
-    from scipy import ndimage
-
-    labels = ndimage.label(filled, np.ones((3, 3, 3)))[0]
-    links: dict[int, set[tuple[int, int, int, int]]] = {}
-    wrapped = np.pad(labels, 1, mode="wrap")
-    for step in np.ndindex(3, 3, 3):
-        window = tuple(slice(offset, offset + size) for offset, size in zip(step, labels.shape, strict=True))
-        beyond = _cells_beyond(labels.shape, step)
-        crossing = (labels > 0) & (wrapped[window] > 0) & np.any(beyond != 0, axis=-1)
-        pairs = np.column_stack([labels[crossing], wrapped[window][crossing], beyond[crossing]])
-        for one, other, x, y, z in np.unique(pairs, axis=0).tolist():
-            links.setdefault(one, set()).add((other, x, y, z))
-    where: dict[int, tuple[int, int, int]] = {}
-    for first in links:
-        waiting = [] if first in where else [first]
-        where.setdefault(first, (0, 0, 0))
-        while waiting:
-            here = waiting.pop()
-            for other, *step_to in links[here]:
-                x, y, z = (a + b for a, b in zip(where[here], step_to, strict=True))
-                if other not in where:
-                    where[other] = x, y, z
-                    waiting.append(other)
-                elif where[other] != (x, y, z):
-                    return True
-    return False
-
-
-def _cells_beyond(shape: tuple[int, ...], step: tuple[int, ...]) -> Integers:
-    """In which cell, from -1 to 1 along each axis, the node lies that a step (0 to 2, less 1) leads to."""
-    axes = [np.floor_divide(np.arange(size) + offset - 1, size) for size, offset in zip(shape, step, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    """Tell whether filled nodes of a periodic grid, joined along edges and diagonals, lead to their own images."""
+    number = np.flatnonzero(filled)
+    at = np.stack(np.unravel_index(number, filled.shape), axis=1)
+    first, second, cells = [], [], []
+    for step in _ONWARD:
+        cell, other = np.divmod(at + step, filled.shape)
+        there = np.ravel_multi_index(tuple(other.T), filled.shape)
+        joined = filled.ravel()[there]
+        first.append(number[joined])
+        second.append(there[joined])
+        cells.append(cell[joined])
+    return runs_on(filled.size, np.concatenate(first), np.concatenate(second), np.concatenate(cells))

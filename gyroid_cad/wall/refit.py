@@ -1,4 +1,4 @@
-"""The wall of a lattice that varies: every patch fitted anew, all at once, by one linear operator.
+"""The wall of a graded lattice: every patch fitted anew, all at once, by one linear operator.
 
 On a grid of samples with the square's border in it, the staged fit of :mod:`gyroid_cad.surface.fit` (corners, then
 edges from their own samples, then the interior) is one small matrix applied along u and then along v. So all
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.nurbs.surface import basis, edge_row, grid_derivatives, uniform_knots
-from gyroid_cad.surface.fit_settings import DEGREE, MOST_CONTROL_POINTS, more_control_points
+from gyroid_cad.surface.fit import DEGREE, MOST_CONTROL_POINTS, more_control_points
 from gyroid_cad.wall.complex import CellComplex
-from gyroid_cad.wall.exact import laid_patches
+from gyroid_cad.wall.exact import offset_patches
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Refit", "fitted_nets", "fitted_wall", "likely_control_points", "measured"]
+__all__ = ["Refit", "fitted_nets", "graded_wall", "likely_control_points", "measured"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -39,7 +39,7 @@ _EDGE_GAP_LIMIT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Refit:
-    """What the fit of a wall that varies is worth.
+    """Errors of the fit of a graded wall.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Refit:
         Relative, of the distance between the faces along the exact normal.
     max_normal_angle : float
         In degrees, between the normals of the fitted and of the exact mid-surface.
-    thinnest, thickest : float
+    min_thickness, max_thickness : float
         Wall asked for, in mm.
     samples : int
         Along each side of a patch, at which all this was measured.
@@ -61,16 +61,16 @@ class Refit:
     max_deviation: float
     max_wall_error: float
     max_normal_angle: float
-    thinnest: float
-    thickest: float
+    min_thickness: float
+    max_thickness: float
     samples: int
 
     def excess(self, tolerance: float, cell_size: float) -> float:
-        """How many times as far off the fit is as it may be."""
+        """Error of the fit in units of what it may be."""
         return max(self.max_deviation / (tolerance * cell_size), self.max_wall_error / (WALL_PER_TOLERANCE * tolerance))
 
     def control_points_for(self, tolerance: float, cell_size: float) -> int:
-        """How many control points to fit with next; as many as now if the fit is as close as asked for.
+        """Number of control points to fit with next; as many as now if the fit is close enough.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Refit:
 
 
 def likely_control_points(complex: CellComplex, grading: Grading, least: int, tolerance: float) -> int:
-    """How many control points the tolerance is likely to take, from a fit of a few patches.
+    """Number of control points that the tolerance is likely to take, from a fit of a few patches.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def likely_control_points(complex: CellComplex, grading: Grading, least: int, to
     return least if excess <= 1 else more_control_points(least, excess)
 
 
-def fitted_wall(complex: CellComplex, grading: Grading, control_points: int) -> Wall:
+def graded_wall(complex: CellComplex, grading: Grading, control_points: int) -> Wall:
     """Fit every patch's two faces with so many control points a side.
 
     Raises
@@ -146,9 +146,9 @@ def fitted_nets(complex: CellComplex, grading: Grading, control_points: int, pat
     """Control points of the two faces of some patches; shape (patches, 2, n, n, 3)."""
     samples, operator = _fit_operator(control_points)
     nets = np.empty((len(patches), 2, control_points, control_points, 3))
-    for some, laid in laid_patches(complex, grading, samples, patches):
-        offset = laid.normals * (laid.thickness / 2)[:, np.newaxis]
-        faces = np.concatenate([laid.points - offset, laid.points + offset], axis=1)
+    for some, fitted in offset_patches(complex, grading, samples, patches):
+        offset = fitted.normals * (fitted.thickness / 2)[:, np.newaxis]
+        faces = np.concatenate([fitted.points - offset, fitted.points + offset], axis=1)
         along_u = operator @ faces.reshape(-1, len(samples), len(samples) * 6)
         net = operator @ along_u.reshape(-1, control_points, len(samples), 6)
         nets[some] = np.moveaxis(net.reshape(*net.shape[:-1], 2, 3), -2, 1)
@@ -174,13 +174,13 @@ def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Inte
     knots, weights = (uniform_knots(n),) * 2, np.ones((n, n))
     samples = np.linspace(-1, 1, _CHECKS_PER_SPAN * (n - DEGREE) + 1)
     worst = np.zeros(3)
-    thinnest, thickest = np.inf, 0.0
-    for some, laid in laid_patches(complex, grading, samples, patches):
+    min_thickness, max_thickness = np.inf, 0.0
+    for some, fitted in offset_patches(complex, grading, samples, patches):
         points, du, dv = grid_derivatives(nets[some], weights, knots, samples, samples)
         shape = (len(points), len(samples), len(samples))
-        thickness, normal = laid.thickness.reshape(shape), laid.normals.reshape(*shape, 3)
+        thickness, normal = fitted.thickness.reshape(shape), fitted.normals.reshape(*shape, 3)
         half = (thickness / 2)[..., np.newaxis] * normal
-        off = points - laid.points.reshape(*shape, 3)[:, np.newaxis] - np.stack([-half, half], axis=1)
+        off = points - fitted.points.reshape(*shape, 3)[:, np.newaxis] - np.stack([-half, half], axis=1)
         # The fitted faces' own normals: how far off they are, and how far along the exact normal they are met.
         outwards = _unit(np.cross(du, dv))
         distance = dot(off, outwards)
@@ -188,9 +188,12 @@ def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Inte
         middle = _unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
         sine = np.linalg.norm(np.cross(middle, normal), axis=-1)
         worst = np.maximum(worst, [_largest(distance), _largest((met[:, 1] - met[:, 0]) / thickness), _largest(sine)])
-        thinnest, thickest = min(thinnest, float(thickness.min())), max(thickest, float(thickness.max()))
+        min_thickness, max_thickness = (
+            min(min_thickness, float(thickness.min())),
+            max(max_thickness, float(thickness.max())),
+        )
     angle = float(np.degrees(np.arcsin(min(worst[2], 1.0))))
-    return Refit(n, float(worst[0]), float(worst[1]), angle, thinnest, thickest, len(samples))
+    return Refit(n, float(worst[0]), float(worst[1]), angle, min_thickness, max_thickness, len(samples))
 
 
 @lru_cache(maxsize=16)

@@ -1,4 +1,4 @@
-"""Whether a wall that varies can exist: inside its own curvature, and clear of the walls opposite.
+"""Self-intersection of graded walls: local, beyond their own curvature, and global, with the walls opposite.
 
 The kernel's check says "valid" to a wall that meets itself, so this is decided here, on the exact wall, before
 anything is fitted. That the map turns nothing inside out is seen to by :mod:`gyroid_cad.wall.grading`, wherever it
@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
-from gyroid_cad.errors import SoundnessError
+from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import given_as
 from gyroid_cad.nurbs.surface import grid_derivatives
 from gyroid_cad.wall.complex import CellComplex
-from gyroid_cad.wall.exact import differentiation_matrix, interpolation_matrix, laid_patches, sampled_place
+from gyroid_cad.wall.exact import differentiation_matrix, interpolation_matrix, offset_patches, sampled_point
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["CLEARANCE_SAMPLES", "FOLD_SAMPLES", "require_sound", "require_sound_fit"]
+__all__ = ["CLEARANCE_SAMPLES", "FOLD_SAMPLES", "require_simple", "require_simple_fit"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -49,7 +49,7 @@ _PATCHES_AT_ONCE = 64
 
 @dataclass(frozen=True, slots=True)
 class _Worst:
-    """Where the wall would have to be scaled most to pass, and by what."""
+    """Place where the wall would have to be scaled most to pass, and the factor."""
 
     factor: float
     patch: int
@@ -58,7 +58,7 @@ class _Worst:
     reason: str
 
 
-def require_sound(complex: CellComplex, grading: Grading) -> None:
+def require_simple(complex: CellComplex, grading: Grading) -> None:
     """Refuse a wall thicker than its curvature lets it be, or that meets another across a pore or elsewhere.
 
     Laid off by s times its half thickness the mid-surface's area vector along the wall is a quadratic in s; the
@@ -75,15 +75,15 @@ def require_sound(complex: CellComplex, grading: Grading) -> None:
     ------
     ParameterError
         If a field or the map is no good somewhere.
-    SoundnessError
+    SelfIntersectionError
         Naming the place that is furthest from sound, what is there, and what would pass.
     """
     nodes = -np.cos(np.pi * np.arange(FOLD_SAMPLES) / (FOLD_SAMPLES - 1))
     middles, halves, found = [], [], []
-    for some, laid in laid_patches(complex, grading, nodes):
+    for some, fitted in offset_patches(complex, grading, nodes):
         shape = (-1, FOLD_SAMPLES, FOLD_SAMPLES)
-        middle, normal = laid.points.reshape(*shape, 3), laid.normals.reshape(*shape, 3)
-        reach = (laid.thickness / 2).reshape(shape)[..., np.newaxis]
+        middle, normal = fitted.points.reshape(*shape, 3), fitted.normals.reshape(*shape, 3)
+        reach = (fitted.thickness / 2).reshape(shape)[..., np.newaxis]
         found.append(_nearest_to_folding(nodes, middle, normal, reach, some.start))
         middles.append(middle[:, ::2, ::2].reshape(-1, 3))
         halves.append((reach * normal)[:, ::2, ::2].reshape(-1, 3))
@@ -127,7 +127,7 @@ def _exact_fold_factor(nodes: Floats, places: Floats, middle: Floats, normal: Fl
     return _fold_factor(through, middle_u, half * normal_u, middle_v, half * normal_v)
 
 
-def require_sound_fit(wall: Wall, grading: Grading) -> None:
+def require_simple_fit(wall: Wall, grading: Grading) -> None:
     """Refuse a fitted wall that folds over, as one within the fit's error of the limit may.
 
     Parameters
@@ -138,8 +138,8 @@ def require_sound_fit(wall: Wall, grading: Grading) -> None:
 
     Raises
     ------
-    SoundnessError
-        As :func:`require_sound` does.
+    SelfIntersectionError
+        As :func:`require_simple` does.
     """
     coarse, fine = (np.linspace(-1, 1, count) for count in (FOLD_SAMPLES, _FINE_SAMPLES))
     reason = f"where the fit with {len(wall.weights)} control points a side folds over"
@@ -164,7 +164,7 @@ def _fitted_fold_factor(wall: Wall, some: slice, samples: Floats) -> Floats:
 
 
 def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats) -> list[_Worst]:
-    """Where walls meet others most, if they do."""
+    """Places where walls meet others most, if they do."""
     from scipy.spatial import cKDTree
 
     patch = np.repeat(np.arange(complex.patch_count), CLEARANCE_SAMPLES**2)
@@ -214,7 +214,7 @@ class _Lookup:
     steps: Floats
 
     def met(self, samples: Integers, offsets: Floats) -> tuple[tuple[Integers, Floats], Integers]:
-        """Which samples, moved by the offsets, lie in other walls, and what factor on both walls would part them.
+        """Samples that, moved by the offsets, lie in other walls, and the factor on both walls that would part them.
 
         Also those that only come nearer to another mid-surface than to their own: they may have passed its wall.
         """
@@ -233,7 +233,7 @@ class _Lookup:
         return (first[inside], factor), first[other & ~inside]
 
     def beside(self, samples: Integers) -> tuple[tuple[Integers, Floats], Integers]:
-        """Which samples lie over a mid-surface that is no neighbour, nearer than both walls reach, and the same factor.
+        """Samples over a mid-surface that is no neighbour, nearer than both walls reach, and the same factor.
 
         Walls thinner than the places looked at lie apart would else pass unseen. Also those that the other mid-surface
         parts from one of the places next to them: whatever the walls, these cross.
@@ -255,7 +255,7 @@ class _Lookup:
         return (first[factor < 1], factor[factor < 1]), first[parted]
 
     def _over(self, first: Integers, second: Integers) -> tuple[Booleans, Floats]:
-        """Whether the first samples stand over the cells round the second ones, and how high."""
+        """Mask of the first samples that stand over the cells round the second ones, and their heights."""
         apart = self.middle[first] - self.middle[second]
         steps = self.steps[second]
         # In steps of the grid, by least squares in the tangent plane.
@@ -269,7 +269,7 @@ class _Lookup:
         return np.all((low <= along) & (along <= high), axis=1), height
 
     def _neighbours(self, first: Integers, second: Integers) -> Booleans:
-        """Whether the patches of two samples share a corner."""
+        """Mask of the sample pairs whose patches share a corner."""
         corners = (self.corners[self.patch[samples]] for samples in (first, second))
         one, other = corners
         return np.asarray((one[:, :, np.newaxis] == other[:, np.newaxis, :]).any(axis=(1, 2)))
@@ -302,12 +302,12 @@ def _meeting_factor(apart: Floats, half: Floats, other_reach: Floats) -> Floats:
     return np.where(aside <= foot * other_reach, by_tip, aside / other_reach)
 
 
-def _too_thick(complex: CellComplex, grading: Grading, worst: _Worst) -> SoundnessError:
-    place = sampled_place(complex, grading.cell_size, worst.samples, worst.patch, worst.index)
-    asked = float(grading.asked(np.array([place]))[0])
+def _too_thick(complex: CellComplex, grading: Grading, worst: _Worst) -> SelfIntersectionError:
+    place = sampled_point(complex, grading.cell_size, worst.samples, worst.patch, worst.index)
+    requested = float(grading.requested(np.array([place]))[0])
     if grading.density is None:
         name = given_as("thickness", grading.thickness)
-        return SoundnessError(name, asked, place, worst.factor * asked, worst.reason, unit=" mm")
+        return SelfIntersectionError(name, requested, place, worst.factor * requested, worst.reason, unit=" mm")
     tube = grading.surface.tube
-    limit = tube.density(worst.factor * tube.thickness(asked))
-    return SoundnessError(given_as("density", grading.density), asked, place, limit, worst.reason)
+    limit = tube.density(worst.factor * tube.thickness(requested))
+    return SelfIntersectionError(given_as("density", grading.density), requested, place, limit, worst.reason)

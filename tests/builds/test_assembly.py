@@ -19,15 +19,16 @@ from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_Label, TDF_LabelSequence
+from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopoDS import TopoDS, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.common import memory
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
+from gyroid_cad.kernel.compat import LabelSequence, as_face
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.lattice import Lattice
@@ -55,13 +56,12 @@ class ReadBack:
     @property
     def faces(self) -> dict[str, tuple[Any, str]]:
         """Face and colour, by name; of the part's colour where a face has none of its own."""
-        labels = TDF_LabelSequence()
+        labels = LabelSequence()
         XCAFDoc_ShapeTool.GetSubShapes_s(self.parts[0], labels)
         whole = colour_of(self.parts[0])
         found = [labels.Value(i) for i in range(1, labels.Length() + 1)]
         return {
-            name_of(label): (TopoDS.Face_s(XCAFDoc_ShapeTool.GetShape_s(label)), colour_of(label) or whole)
-            for label in found
+            name_of(label): (as_face(XCAFDoc_ShapeTool.GetShape_s(label)), colour_of(label) or whole) for label in found
         }
 
 
@@ -86,7 +86,7 @@ def read_assembly(path: Path) -> ReadBack:
     reader = STEPCAFControl_Reader()
     assert reader.ReadFile(str(path)) == IFSelect_RetDone
     assert reader.Transfer(document)
-    roots, components = TDF_LabelSequence(), TDF_LabelSequence()
+    roots, components = LabelSequence(), LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
     assert roots.Length() == 1
     XCAFDoc_ShapeTool.GetComponents_s(roots.First(), components)
@@ -194,9 +194,8 @@ def test_more_cells_cost_a_few_hundred_bytes_each(lattice: Lattice, tmp_path: Pa
     assert sizes[1] - sizes[0] < 99 * 700
 
 
-def test_build123d_and_cadquery_read_the_tree_with_its_names_and_colour(path: Path) -> None:
+def test_build123d_reads_the_tree_with_its_name_and_colour(path: Path) -> None:
     import build123d
-    import cadquery
 
     tree = build123d.import_step(path)
     assert tree.label == "block"
@@ -204,6 +203,10 @@ def test_build123d_and_cadquery_read_the_tree_with_its_names_and_colour(path: Pa
         (i * SIZE, j * SIZE, k * SIZE) for i, j, k in np.ndindex(CELLS)
     )
     assert {tuple(child.color) for child in tree.children} == {(0.0, 1.0, 0.0, 1.0)}
+
+
+def test_cadquery_reads_the_tree_with_its_names(path: Path) -> None:
+    cadquery = pytest.importorskip("cadquery", reason="no CadQuery for this kernel")
     assembly = cadquery.Assembly.importStep(str(path))
     assert [child.name for child in assembly.children] == [
         f"CC_{i + 1}_{j + 1}_{k + 1}" for i, j, k in np.ndindex(CELLS)
@@ -220,7 +223,7 @@ def varying(x: Any, y: Any, z: Any) -> Any:
     ids=["varying", "mapped", "trimmed"],
 )
 def test_cells_that_differ_or_are_cut_have_no_part_in_common(settings: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="instances = True: expected a lattice whose cells are all alike"):
+    with pytest.raises(ParameterError, match="instances = True: expected a lattice whose cells are uniform"):
         Lattice((2, 1, 1), SIZE, **settings).write(tmp_path / "none.step", instances=True)
     assert not list(tmp_path.iterdir())
 

@@ -23,7 +23,7 @@ from gyroid_cad.fields.makers import linear
 from gyroid_cad.kernel.check import Topology, enclosed_volume, topology
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall import fitted
-from gyroid_cad.wall.fitted import Recipe
+from gyroid_cad.wall.fitted import LatticeSpec
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
@@ -41,14 +41,14 @@ def build(
     settings: FitSettings,
     progress: Progress | None = None,
 ) -> Build:
-    return build_module.build(Recipe(cells, Grading(cell_size, thickness), settings, 1e-2), progress)
+    return build_module.build(LatticeSpec(cells, Grading(cell_size, thickness), settings, 1e-2), progress)
 
 
 @pytest.fixture
 def forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """No build is remembered from before, nor this one after."""
     monkeypatch.setattr(build_module, "_builds", type(build_module._builds)())
-    monkeypatch.setattr(fitted, "_laid", type(fitted._laid)())
+    monkeypatch.setattr(fitted, "_fitted", type(fitted._fitted)())
 
 
 @pytest.fixture
@@ -77,19 +77,19 @@ def test_every_stage_is_told_from_nought_to_done_and_timed() -> None:
 def test_a_wall_that_varies_is_checked_before_it_is_fitted_and_measured_after() -> None:
     made = build(CELLS, 10.0, linear(0.6, x=0.02), COARSE)
     assert list(made.seconds) == ["complex", "soundness", "deviation", "fit", "kernel", "solid", "check"]
-    laid = made.laid
-    assert laid.refit is not None
-    assert laid.refit.control_points == len(laid.wall.weights)
-    assert laid.samples_per_patch["deviation"] == laid.refit.samples**2
-    assert laid.thinnest == laid.refit.thinnest < laid.refit.thickest
+    fitted = made.fitted
+    assert fitted.refit is not None
+    assert fitted.refit.control_points == len(fitted.wall.weights)
+    assert fitted.samples_per_patch["deviation"] == fitted.refit.samples**2
+    assert fitted.min_thickness == fitted.refit.min_thickness < fitted.refit.max_thickness
 
 
 @pytest.mark.usefixtures("forgotten")
 def test_the_control_points_a_varying_wall_takes_are_asked_of_memory_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-    monkeypatch.setattr(fitted, "require_memory", lambda cells, size, n=10: asked.append(n))
-    made = build_module.build(Recipe(CELLS, Grading(10.0, linear(0.6, x=0.02)), COARSE, 1e-4))
-    assert asked[0] == 4 < asked[-1] == len(made.laid.wall.weights)
+    requested: list[int] = []
+    monkeypatch.setattr(fitted, "require_memory", lambda cells, size, n=10: requested.append(n))
+    made = build_module.build(LatticeSpec(CELLS, Grading(10.0, linear(0.6, x=0.02)), COARSE, 1e-4))
+    assert requested[0] == 4 < requested[-1] == len(made.fitted.wall.weights)
 
 
 @pytest.mark.usefixtures("forgotten")
@@ -114,7 +114,7 @@ def test_a_build_has_looked_at_its_own_solid(one_build: Build) -> None:
     assert one_build.topology == topology(one_build.solid())
     assert one_build.topology.closed
     assert one_build.volume == enclosed_volume(one_build.solid())
-    assert one_build.volume == pytest.approx(one_build.laid.wall.volume(), rel=1e-12)
+    assert one_build.volume == pytest.approx(one_build.fitted.wall.volume(), rel=1e-12)
     assert one_build.valid()
 
 
@@ -165,13 +165,13 @@ def test_a_shape_that_is_not_closed_is_refused(monkeypatch: pytest.MonkeyPatch) 
 def test_a_shape_that_encloses_another_volume_than_its_nets_is_refused(
     monkeypatch: pytest.MonkeyPatch, wrong: str
 ) -> None:
-    realise = gyroid_cad.kernel.solid.realise
+    build_solid = gyroid_cad.kernel.solid.build_solid
     thicker = build(CELLS, 10.0, 0.81, COARSE).solid()
 
     def wrongly(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
-        return realise(wall, progress).Reversed() if wrong == "inside out" else thicker
+        return build_solid(wall, progress).Reversed() if wrong == "inside out" else thicker
 
-    monkeypatch.setattr(gyroid_cad.kernel.solid, "realise", wrongly)
+    monkeypatch.setattr(gyroid_cad.kernel.solid, "build_solid", wrongly)
     with pytest.raises(KernelError, match=r"encloses -?[\d.]+ mm3, its control nets [\d.]+ mm3"):
         build(CELLS, 10.0, 0.8, COARSE)
 
@@ -195,12 +195,12 @@ def test_a_solid_the_kernel_calls_invalid_is_not_written(tmp_path: Path, monkeyp
 
 @pytest.mark.usefixtures("forgotten")
 def test_the_kernels_check_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[TopoDS_Shape] = []
-    monkeypatch.setattr(gyroid_cad.kernel.check, "is_valid", lambda shape: not asked.append(shape))
+    requested: list[TopoDS_Shape] = []
+    monkeypatch.setattr(gyroid_cad.kernel.check, "is_valid", lambda shape: not requested.append(shape))
     made = build(CELLS, 10.0, 0.8, COARSE)
     assert made.valid()
     assert made.valid()
-    assert len(asked) == 1
+    assert len(requested) == 1
 
 
 def test_the_ending_chooses_the_format_whatever_its_case(one_build: Build, tmp_path: Path) -> None:

@@ -23,13 +23,14 @@ from gyroid_cad.common import memory
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.surface.fit import FitSettings, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 
 Captured = pytest.CaptureFixture[str]
 
 KEYS = [
-    *("cells", "cell_size", "thickness", "thinnest", "thickest", "density", "patches", "faces", "solids"),
-    *("control_points", "valid", "closed", "free_edges", "pinch_lines", "volume", "volume_exact"),
+    *("cells", "cell_size", "thickness", "min_thickness", "max_thickness", "density", "patches", "faces", "solids"),
+    *("control_points", "valid", "closed", "boundary_edges", "non_manifold_edges", "volume", "volume_exact"),
     *("max_deviation", "max_wall_error", "max_normal_angle", "samples_per_patch", "seconds", "files"),
 ]
 ONE_CELL = ["--cells", "1", "1", "1", "--cell-size", "10"]
@@ -90,7 +91,7 @@ def test_what_the_program_says_of_its_file_is_true_of_the_file(
     summary, counted = json.loads(run.stdout), topology(read_step(folder / "part.step"))
     assert (summary["faces"], summary["solids"], summary["closed"]) == (counted.faces, counted.solids, counted.closed)
     assert summary["valid"]
-    assert summary["faces"] == 2 * summary["patches"] + summary["free_edges"]
+    assert summary["faces"] == 2 * summary["patches"] + summary["boundary_edges"]
     assert summary["volume"] == pytest.approx(summary["volume_exact"], rel=2e-6)
 
 

@@ -69,7 +69,7 @@ def test_with_a_skin_left_open_at_one_side_it_is_one_closed_solid(capsys: Captur
     assert is_valid(shape)
     assert topology(shape).closed
     assert summary["solids"] - summary["islands"] == 1
-    assert summary["smallest_wall"] == summary["skin"] == 0.8
+    assert summary["min_wall"] == summary["skin"] == 0.8
     # The skin alone: the block less what is left of it within four walls, open above and below.
     assert summary["volume"] > 6 * 5 * 7 - 4.4 * 3.4 * 7
 

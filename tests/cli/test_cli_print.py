@@ -106,11 +106,11 @@ def test_build_adds_the_check_to_its_summary(capsys: Captured, tmp_path: Path, n
 def test_a_printer_of_ones_own_may_stand_in_the_lattices_file(capsys: Captured, tmp_path: Path) -> None:
     printer = tmp_path / "tiny.toml"
     printer.write_text(
-        '[tiny]\nname = "Tiny"\nprocess = "resin"\nbuild_volume = [5, 5, 5]\nsmallest_supported_wall = 0.1\n'
-        "smallest_unsupported_wall = 0.1\nsmallest_drain_hole = 0.1\n"
+        '[tiny]\nname = "Tiny"\nprocess = "resin"\nbuild_volume = [5, 5, 5]\nmin_supported_wall = 0.1\n'
+        "min_unsupported_wall = 0.1\nmin_drain_hole = 0.1\n"
     )
     (tmp_path / "a.toml").write_text(
-        f'cells = [1, 1, 1]\ncell_size = 10\nthickness = 0.8\ncontrol_points = 5\nprinter = "{printer}"\n'
+        'cells = [1, 1, 1]\ncell_size = 10\nthickness = 0.8\ncontrol_points = 5\nprinter = "tiny.toml"\n'
     )
     done = run(capsys, "print-check", tmp_path / "a.toml")
     assert done.status == 1

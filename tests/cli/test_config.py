@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gyroid_cad.cli.config import printed_config, read_config
+from gyroid_cad.common.inputs import key_line
 from gyroid_cad.errors import ParameterError
 
 KNOWN = ["cells", "cell_size", "thickness", "scale_field", "map"]
@@ -26,7 +27,7 @@ def written(folder: Path, text: str) -> str:
 @given(given=st.dictionaries(st.sampled_from(KNOWN), st.one_of(values, st.lists(values, min_size=1).map(tuple))))
 def test_what_is_printed_is_read_back(tmp_path_factory: pytest.TempPathFactory, given: dict[str, object]) -> None:
     path = written(tmp_path_factory.mktemp("config"), printed_config(given))
-    read = read_config(path, KNOWN)
+    read = read_config(path, KNOWN).values
     assert set(read) == set(given)
     for key, value in given.items():
         parts, expected = (list(a) if isinstance(a, list | tuple) else [a] for a in (read[key], value))
@@ -88,15 +89,49 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     (tmp_path / "latin.toml").write_bytes(b"map = '\xe9'")
     with pytest.raises(ParameterError, match="TOML"):
         read_config(str(tmp_path / "latin.toml"), KNOWN)
-    (tmp_path / "large.toml").write_bytes(b"#" * 1_000_001)
-    with pytest.raises(ParameterError, match="at most"):
-        read_config(str(tmp_path / "large.toml"), KNOWN)
+
+
+def test_keys_may_stand_in_a_table_of_the_lattice_or_at_the_top(tmp_path: Path) -> None:
+    text = "map = 'twist:angle=9'\n[lattice]\ncells = [1, 2, 3]\nthickness = 0.8\n"
+    expected = {"map": "twist:angle=9", "cells": ["1", "2", "3"], "thickness": "0.8"}
+    assert read_config(written(tmp_path, text), KNOWN).values == expected
+    with pytest.raises(ParameterError, match=r"lattice.toml, line 1: map = .*each key once"):
+        read_config(written(tmp_path, "map = 'a'\n[lattice]\nmap = 'b'\n"), KNOWN)
+    with pytest.raises(
+        ParameterError, match=r"lattice.toml, line 2: build = \['map'\]: expected no table but \[lattice"
+    ):
+        read_config(written(tmp_path, "\n[build]\nmap = 'b'\n"), KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "line"),
+    [
+        ("cells = [1, 1, 1]\nmap = 3", "map", 2),
+        ("cells = [\n1,\n1,\n1]\n\n  'map' = 3", "map", 6),
+        ("# map is given below\nmap.radius = 3", "map", 2),
+        ("mapped = 1\n[map]", "map", 2),
+    ],
+)
+def test_a_key_is_found_on_its_line(text: str, key: str, line: int) -> None:
+    assert key_line(text, key) == line
+
+
+def test_a_file_to_be_written_stays_in_the_folder_of_the_file_that_names_it(tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "away").symlink_to(tmp_path)
+    config = read_config(written(tmp_path / "inner", "map = 'a'"), KNOWN)
+    for inside in ("a.step", "./a.step", "../inner/a.step", str(tmp_path / "inner" / "a.step")):
+        assert Path(config.output("map", inside)).resolve() == (tmp_path / "inner" / "a.step").resolve()
+    for outside in ("../a.step", str(tmp_path / "a.step"), "away/a.step"):
+        with pytest.raises(ParameterError, match=r"line 1: map = .*in the folder of .*or --allow-outside"):
+            config.output("map", outside)
+        assert Path(config.output("map", outside, anywhere=True)).resolve() == (tmp_path / "a.step").resolve()
 
 
 def test_a_flag_is_true_or_false_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "lattice.toml"
     path.write_text("instances = true\n")
-    assert read_config(str(path), ["instances"], ["instances"]) == {"instances": "True"}
+    assert read_config(str(path), ["instances"], ["instances"]).values == {"instances": "True"}
     for value in ("1", '"true"', "[true]"):
         path.write_text(f"instances = {value}\n")
         with pytest.raises(ParameterError, match=r"instances = .*: expected true or false"):

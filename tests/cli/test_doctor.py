@@ -45,7 +45,7 @@ def test_the_packages_it_looks_for_are_those_that_pyproject_asks_for() -> None:
 
 
 def test_where_the_tests_run_all_that_is_required_is_there_and_works(healthy: Diagnosis) -> None:
-    assert healthy.well
+    assert healthy.ok
     found = {finding.subject: finding for finding in healthy.findings}
     assert found["gyroid_cad"].detail == __version__
     assert found["kernel"].detail == kernel_version()
@@ -64,7 +64,7 @@ def test_the_kernel_has_the_version_that_its_wheel_says(healthy: Diagnosis) -> N
 
 def test_the_self_test_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert diagnose().well
+    assert diagnose().ok
     assert not list(tmp_path.iterdir())
 
 
@@ -72,13 +72,13 @@ def test_a_missing_package_that_is_required_is_a_failure_and_another_is_none(mon
     real: Callable[[str], str | None] = doctor._version
 
     def without(name: str) -> Callable[[str], str | None]:
-        return lambda asked: None if asked == name else real(asked)
+        return lambda requested: None if requested == name else real(requested)
 
     monkeypatch.setattr(doctor, "_self_test", lambda: iter(()))
     for name, well in (("meshio", False), ("mapdl-archive", True)):
         monkeypatch.setattr(doctor, "_version", without(name))
         diagnosis = diagnose()
-        assert (diagnosis.well, states(diagnosis)[name]) == (well, "missing")
+        assert (diagnosis.ok, states(diagnosis)[name]) == (well, "missing")
 
 
 def test_programs_are_looked_for_and_not_required(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_programs_are_looked_for_and_not_required(monkeypatch: pytest.MonkeyPatc
     assert states(diagnose())["ccx"] == "good"
     program.unlink()
     diagnosis = diagnose()
-    assert (states(diagnosis)["ccx"], diagnosis.well) == ("missing", True)
+    assert (states(diagnosis)["ccx"], diagnosis.ok) == ("missing", True)
 
 
 def test_a_step_file_that_comes_back_wrong_is_status_one_and_named(
@@ -106,7 +106,7 @@ def test_a_step_file_that_comes_back_wrong_is_status_one_and_named(
     assert main(["doctor", "--json"]) == 1
     out, err = capsys.readouterr()
     shown = json.loads(out)
-    assert (shown["well"], err) == (False, "")
+    assert (shown["ok"], err) == (False, "")
     found = {finding["subject"]: finding for finding in shown["findings"]}
     assert [found[subject]["state"] for subject in SELF_TEST] == ["good", "good", "failed", "good"]
     assert "it comes back as Topology(solids=1, faces=6" in found["STEP is written and read"]["detail"]
@@ -119,7 +119,7 @@ def test_the_table_and_the_json_say_the_same(capsys: Captured, healthy: Diagnosi
     assert main(["doctor"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[0] for line in lines] == [*states(healthy), "verdict"]
-    assert "well" in lines[-1]
+    assert "ok" in lines[-1]
 
 
 def test_the_version_tells_the_kernels_and_loads_none(capsys: Captured) -> None:

@@ -142,7 +142,7 @@ def test_a_folder_or_file_that_may_not_be_written_is_refused(
     path.write_text("older")
     refused = tmp_path if forbidden == "folder" else path
     # The system is asked, for permission bits mean nothing to a privileged user.
-    monkeypatch.setattr(os, "access", lambda asked, mode: Path(asked) != refused)
+    monkeypatch.setattr(os, "access", lambda requested, mode: Path(requested) != refused)
     with pytest.raises(ParameterError, match="may be written") as caught:
         require_writable(path)
     assert str(tmp_path) in caught.value.accepted

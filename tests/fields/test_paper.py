@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad import Lattice
-from gyroid_cad.errors import ParameterError, SoundnessError
+from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field
-from gyroid_cad.fields.paper import PaperUnits, paper_units
+from gyroid_cad.fields.makers import PaperUnits, paper_units
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, placed_corners
 from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.exact import exact_measures
-from gyroid_cad.wall.refit import WALL_PER_TOLERANCE, fitted_nets, fitted_wall, measured
-from gyroid_cad.wall.self_intersection import require_sound, require_sound_fit
+from gyroid_cad.wall.refit import WALL_PER_TOLERANCE, fitted_nets, graded_wall, measured
+from gyroid_cad.wall.self_intersection import require_simple, require_simple_fit
 
 TUBE = USUAL.tube
 
@@ -53,12 +53,12 @@ def values(field: float | Field | None, points: Floats) -> Floats:
 def parts(name: str, cells: Cells | None = None, scale: float = 1.0) -> tuple[Lattice, CellComplex, Any]:
     printed, thickness, length = SPECIMENS[name]
     lattice = Lattice.paper(cells or printed, thickness, length, scale)
-    return lattice, build_complex(lattice.cells), lattice._grading()
+    return lattice, build_complex(lattice.cells), lattice.grading()
 
 
 def nets(lattice: Lattice, control_points: int = 6) -> Floats:
     complex = build_complex(lattice.cells)
-    return fitted_nets(complex, lattice._grading(), control_points, np.arange(complex.patch_count))
+    return fitted_nets(complex, lattice.grading(), control_points, np.arange(complex.patch_count))
 
 
 @given(SCALES, st.floats(0.01, 0.3), LENGTHS)
@@ -77,8 +77,8 @@ def test_constant_units_are_those_of_a_plain_lattice(scale: float, factor: float
 def test_a_thickness_factor_is_a_wall_in_mm_of_places_in_mm(scale: float, length: float) -> None:
     units = paper_units(THICKNESS, length, scale)
     x, y, _ = POINTS
-    asked = values(units.thickness, length * scale * POINTS)
-    np.testing.assert_allclose(asked, scale * thickness_of(x, y), rtol=1e-12, atol=1e-12 * scale)
+    requested = values(units.thickness, length * scale * POINTS)
+    np.testing.assert_allclose(requested, scale * thickness_of(x, y), rtol=1e-12, atol=1e-12 * scale)
 
 
 @given(SCALES)
@@ -87,8 +87,8 @@ def test_a_varying_length_is_a_factor_without_unit_of_places_in_mm(scale: float)
     x, y, _ = POINTS
     assert units.cell_size == pytest.approx(BC_PER_CELL * scale)
     np.testing.assert_allclose(values(units.scale_field, scale * POINTS), 1 + 0.05 * x + 0.08 * y, rtol=1e-12)
-    asked = values(units.thickness, scale * POINTS)
-    np.testing.assert_allclose(asked, scale * thickness_of(x, y), rtol=1e-12, atol=1e-12 * scale)
+    requested = values(units.thickness, scale * POINTS)
+    np.testing.assert_allclose(requested, scale * thickness_of(x, y), rtol=1e-12, atol=1e-12 * scale)
 
 
 @settings(max_examples=10)
@@ -120,7 +120,7 @@ def test_a_callable_and_a_field_do_as_well_as_a_formula() -> None:
 def test_lattices_of_the_same_formulas_are_equal() -> None:
     one, two = (Lattice.paper((1, 1, 1), THICKNESS, LENGTH, 2.0) for _ in range(2))
     assert one == two
-    assert hash(one._grading()) == hash(two._grading())
+    assert hash(one.grading()) == hash(two.grading())
     assert one != Lattice.paper((1, 1, 1), THICKNESS, LENGTH, 3.0)
 
 
@@ -167,9 +167,9 @@ def test_a_field_that_fails_somewhere_is_named_as_the_caller_did(thickness: Any,
 @pytest.mark.parametrize("whole", [False, True], ids=["one cell", "as printed"])
 def test_the_papers_specimens_are_sound(name: str, whole: bool) -> None:
     _, complex, grading = parts(name, None if whole else (1, 1, 1))
-    require_sound(complex, grading)
-    wall = fitted_wall(complex, grading, 14)
-    require_sound_fit(wall, grading)
+    require_simple(complex, grading)
+    wall = graded_wall(complex, grading, 14)
+    require_simple_fit(wall, grading)
     made = measured(wall.nets, complex, grading)
     assert made.max_wall_error < WALL_PER_TOLERANCE * 1e-4
     assert made.max_deviation < 1e-4 * grading.cell_size
@@ -180,18 +180,18 @@ def test_the_first_specimen_comes_to_two_thirds_of_its_limit_at_its_far_corner()
     _, complex, _ = parts("thickness")
     centres = placed_corners(complex.placements).mean(axis=1)[complex.patch_placement] / CELL_QUARTERS
     x, y, _ = BC_PER_CELL * (centres + complex.patch_cell).T
-    thickest = int(np.argmax(thickness_of(x, y)))
-    doubled = Lattice.paper((3, 3, 1), f"2*({THICKNESS})")._grading()
-    with pytest.raises(SoundnessError) as caught:
-        require_sound(complex, doubled)
+    max_thickness = int(np.argmax(thickness_of(x, y)))
+    doubled = Lattice.paper((3, 3, 1), f"2*({THICKNESS})").grading()
+    with pytest.raises(SelfIntersectionError) as caught:
+        require_simple(complex, doubled)
     limit, place = caught.value.limit, caught.value.place
     # A little off the patch's centre, where the surface is a little flatter and the wall a little thicker.
     assert BC_PER_CELL * TUBE.thickness_limit <= limit <= 1.001 * BC_PER_CELL * TUBE.thickness_limit
-    assert (place[0], place[1]) == pytest.approx((x[thickest], y[thickest]), abs=0.05)
+    assert (place[0], place[1]) == pytest.approx((x[max_thickness], y[max_thickness]), abs=0.05)
     assert thickness_of(x, y).max() / limit == pytest.approx(2 / 3, abs=0.02)
 
 
 def test_the_thickness_factor_is_the_whole_wall() -> None:
     # Read as the half it would pass the limit.
-    thickest = parts("thickness")[2].asked(np.array([[6.0, 5.5, 0.75]]))[0]
-    assert thickest < BC_PER_CELL * TUBE.thickness_limit < 2 * thickest
+    max_thickness = parts("thickness")[2].requested(np.array([[6.0, 5.5, 0.75]]))[0]
+    assert max_thickness < BC_PER_CELL * TUBE.thickness_limit < 2 * max_thickness

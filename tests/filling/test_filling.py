@@ -1,4 +1,4 @@
-"""Parts filled with gyroid: the wall, the labyrinths, what they weigh, and what is refused."""
+"""Parts filled with gyroid: the wall, the networks, what they weigh, and what is refused."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from OCP.TopAbs import TopAbs_FACE
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial.transform import Rotation
 
+import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
-import gyroid_cad.kernel.split
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.filling.fill import Filled, _turn, fill, part_of
 from gyroid_cad.filling.part import Filling
@@ -159,7 +159,7 @@ def test_whole_cells_are_as_dense_as_was_asked_wherever_they_begin() -> None:
 def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: cq.Workplane, tmp_path: Path) -> None:
     surface, wall = fill(part, CELL, kind="surface", fit=COARSE), fill(part, CELL, 0.05, fit=COARSE)
     report = surface.report
-    assert (report.volume, report.solids, report.smallest_wall, report.closed) == (0, 0, None, False)
+    assert (report.volume, report.solids, report.min_wall, report.closed) == (0, 0, None, False)
     # A thin wall is its mid-surface times its thickness.
     assert report.area == pytest.approx(wall.report.volume / 0.05, rel=1e-3)
     surface.write(tmp_path / "surface.step")
@@ -182,8 +182,8 @@ def test_a_field_is_of_places_in_the_part_and_turns_with_it() -> None:
     before = fill(part, CELL, "0.6 + 0.08*x", fit=COARSE).report
     after = fill(turned, CELL, "0.6 + 0.08*y", rotation=(0, 0, 90), fit=COARSE).report
     assert after.volume == pytest.approx(before.volume, rel=1e-6)
-    assert (before.smallest_wall, before.thickness) == pytest.approx((after.smallest_wall, after.thickness), rel=1e-6)
-    assert before.smallest_wall < before.thickness
+    assert (before.min_wall, before.thickness) == pytest.approx((after.min_wall, after.thickness), rel=1e-6)
+    assert before.min_wall < before.thickness
 
 
 def test_a_wall_that_varies_and_the_channels_it_leaves_are_the_whole_part() -> None:
@@ -217,7 +217,7 @@ def test_a_skin_is_kept_and_fused_with_what_fills_the_core() -> None:
     made, within = fill(ball(), CELL, WALL, fit=COARSE, skin=skin), fill(core, CELL, WALL, fit=COARSE)
     assert made.report.solids == 1
     assert made.report.volume == pytest.approx(BALL - 4 / 3 * np.pi * inner**3 + within.report.volume, rel=1e-4)
-    assert made.report.smallest_wall == skin
+    assert made.report.min_wall == skin
     assert is_valid(made.solid())
 
 
@@ -262,7 +262,7 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"density": 0.3}, "exactly one of the two"),
         ({"thickness": 4.0}, "below 3.7647 mm"),
         ({"kind": "truss"}, " or ".join(KINDS)),
-        ({"kind": "network-a"}, "the labyrinth's volume fraction"),
+        ({"kind": "network-a"}, "the network's volume fraction"),
         ({"kind": "network-a", "thickness": None, "density": "0.3 + 0.01*x"}, "one number above 0.02983"),
         ({"kind": "surface"}, "thickness = 0.9: expected none: the bare surface has no wall"),
         ({"kind": "surface", "thickness": None, "skin": 1}, "skin = 1: expected none round the bare surface"),
@@ -309,7 +309,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
             raise KernelError("tangent")
         return split(*arguments)
 
-    monkeypatch.setattr(gyroid_cad.kernel.regions, "split_by_region", failing_once)
+    monkeypatch.setattr(gyroid_cad.filling.part, "split_by_region", failing_once)
     report = fill(ball(), CELL, WALL, fit=COARSE).report
     assert len(calls) == 2
     assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
@@ -319,7 +319,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
 @pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
 def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
     solids = [ball().val().wrapped] if wrong == "the part itself" else []
-    monkeypatch.setattr(gyroid_cad.kernel.regions, "split_by_region", lambda *arguments: None)
-    monkeypatch.setattr(gyroid_cad.kernel.split, "bounded_solids", lambda *arguments: solids)
+    monkeypatch.setattr(gyroid_cad.filling.part, "split_by_region", lambda *arguments: None)
+    monkeypatch.setattr(gyroid_cad.filling.part, "bounded_solids", lambda *arguments: solids)
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(ball(), CELL, WALL, fit=COARSE)

@@ -21,7 +21,7 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import Topology, enclosed_volume, is_valid, topology
-from gyroid_cad.kernel.solid import realise
+from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import build_complex
@@ -39,7 +39,7 @@ lengths = st.floats(0.1, 100)
 
 @lru_cache(maxsize=16)
 def solid_of(cells: Cells = (1, 1, 1), relative_thickness: float = 0.08, fit: FitSettings = COARSE) -> TopoDS_Shape:
-    return realise(build_wall(build_complex(cells), fit_patch(fit), CELL_SIZE, relative_thickness * CELL_SIZE))
+    return build_solid(build_wall(build_complex(cells), fit_patch(fit), CELL_SIZE, relative_thickness * CELL_SIZE))
 
 
 def faces(shape: TopoDS_Shape) -> list[TopoDS_Shape]:

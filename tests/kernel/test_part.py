@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import measure, require_part
 from gyroid_cad.kernel.split import compound_of
 
@@ -57,7 +58,11 @@ def test_a_part_may_be_several_solids() -> None:
     part = require_part(compound_of([ball(), ball(3 * RADIUS)]))
     assert len(part.solids) == 2
     assert part.volume == pytest.approx(2 * require_part(ball()).volume)
-    assert part.holds(np.array([[0.0, 0, 0], [3 * RADIUS, 0, 0], [1.5 * RADIUS, 0, 0]])).tolist() == [True, True, False]
+    assert part.contains(np.array([[0.0, 0, 0], [3 * RADIUS, 0, 0], [1.5 * RADIUS, 0, 0]])).tolist() == [
+        True,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +85,7 @@ def test_what_is_no_closed_solid_is_refused_with_what_is_wrong(shape: TopoDS_Sha
 
 def test_points_are_held_by_the_ball_that_their_distance_says() -> None:
     points = np.random.default_rng(1).uniform(-RADIUS, RADIUS, (300, 3))
-    assert np.array_equal(require_part(ball()).holds(points), np.linalg.norm(points, axis=1) < RADIUS)
+    assert np.array_equal(require_part(ball()).contains(points), np.linalg.norm(points, axis=1) < RADIUS)
 
 
 @pytest.mark.parametrize("spacing", [0.3, 2.0])
@@ -102,9 +107,8 @@ def test_no_place_on_the_boundary_is_further_from_the_samples_than_is_said(spaci
 def test_sampling_leaves_no_triangles_on_the_users_part() -> None:
     from OCP.BRep import BRep_Tool
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
     shape = ball()
     require_part(shape).surface_samples(0.5)
     for face in parts_of(shape, TopAbs_FACE):
-        assert BRep_Tool.Triangulation_s(TopoDS.Face_s(face), TopLoc_Location()) is None
+        assert BRep_Tool.Triangulation_s(as_face(face), TopLoc_Location()) is None

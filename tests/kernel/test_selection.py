@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import build123d as bd
-import cadquery as cq
 import pytest
 from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
@@ -15,8 +15,13 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.part import require_part
 from gyroid_cad.kernel.selection import selected_faces
 
-BOX = cq.Workplane().box(2, 4, 6)
-PART = require_part(BOX.val().wrapped)
+BOX = bd.Box(2, 4, 6)
+TOP = BOX.faces().sort_by(bd.Axis.Z)[-1]
+PART = require_part(BOX.wrapped)
+
+
+def in_cadquery(face: TopoDS_Face) -> Any:
+    return pytest.importorskip("cadquery", reason="no CadQuery for this kernel").Face(face)
 
 
 def centre(face: TopoDS_Face) -> tuple[float, float, float]:
@@ -43,7 +48,7 @@ def test_a_selector_finds_the_face_furthest_that_way(selector: str, expected: tu
 
 
 def test_a_selector_finds_all_faces_as_far_that_way() -> None:
-    two = require_part(cq.Workplane().pushPoints([(0, 0), (9, 0)]).box(1, 1, 1).combine().val().wrapped)
+    two = require_part((bd.Box(1, 1, 1) + bd.Pos(9) * bd.Box(1, 1, 1)).wrapped)
     assert len(selected_faces(two, [">Z"])) == 2
 
 
@@ -52,15 +57,13 @@ def test_a_point_finds_the_face_it_lies_on() -> None:
     assert centre(found) == pytest.approx((0, 2, 0), abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "face", [BOX.faces(">Z").val(), BOX.faces(">Z").val().wrapped, bd.Face(BOX.faces(">Z").val().wrapped)]
-)
-def test_faces_are_taken_from_any_host(face: Any) -> None:
-    (found,) = selected_faces(PART, [face])
+@pytest.mark.parametrize("given", [in_cadquery, bd.Face, lambda face: face], ids=["cadquery", "build123d", "kernel"])
+def test_faces_are_taken_from_any_host(given: Callable[[TopoDS_Face], Any]) -> None:
+    (found,) = selected_faces(PART, [given(TOP.wrapped)])
     assert centre(found) == pytest.approx((0, 0, 3), abs=1e-9)
 
 
-@pytest.mark.parametrize("wrong", ["Z", ">W", "", 3, None, (1, 2), (float("nan"), 0, 0), BOX.edges(">Z").val()])
+@pytest.mark.parametrize("wrong", ["Z", ">W", "", 3, None, (1, 2), (float("nan"), 0, 0), BOX.edges()[0]])
 def test_what_points_at_no_face_is_refused(wrong: Any) -> None:
     with pytest.raises(ParameterError, match="openings"):
         selected_faces(PART, [wrong])

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import cadquery as cq
+import build123d as bd
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from OCP.TopAbs import TopAbs_FACE
-from OCP.TopoDS import TopoDS, TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import cKDTree
 
-import gyroid_cad.kernel.core
 import gyroid_cad.kernel.offset
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.depth import Depths
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.skin import Hollow, hollow, openings_of
-from gyroid_cad.kernel.solid import realise_faces
+from gyroid_cad.kernel.solid import build_faces
 from gyroid_cad.kernel.split import bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
@@ -38,35 +40,46 @@ RADIUS = 4.0
 SIDES = (9.0, 8.0, 7.0)
 
 
-def wrapped(made: Any) -> TopoDS_Shape:
-    return compound_of(shape.wrapped for shape in made.vals())
+def wrapped(made: bd.Shape) -> TopoDS_Shape:
+    return compound_of(solid.wrapped for solid in made.solids())
 
 
-def ball(radius: float = RADIUS) -> cq.Workplane:
-    return cq.Workplane(origin=(5, 5, 5)).sphere(radius)
+def ball(radius: float = RADIUS) -> bd.Part:
+    return bd.Pos(5, 5, 5) * bd.Sphere(radius)
 
 
-def box() -> cq.Workplane:
-    return cq.Workplane(origin=(5, 5, 5)).box(*SIDES)
+def box(*sides: float) -> bd.Part:
+    return bd.Pos(5, 5, 5) * bd.Box(*sides or SIDES)
 
 
-def plate() -> cq.Workplane:
+def plate() -> bd.Part:
     """20 by 16 by 6, its corners rounded with 3, a hole of 5 across through it."""
-    return cq.Workplane().box(20, 16, 6).edges("|Z").fillet(3).faces(">Z").workplane().hole(5)
+    return bd.fillet(bd.Box(20, 16, 6).edges().filter_by(bd.Axis.Z), 3) - bd.Cylinder(2.5, 6)
 
 
-def dumb_bell() -> cq.Workplane:
+def dumb_bell() -> bd.Part:
     """Its bar is too thin to have a core."""
-    return cq.Workplane().pushPoints([(-8, 0), (8, 0)]).box(6, 6, 6).union(cq.Workplane().box(16, 1, 1))
+    return bd.Pos(-8) * bd.Box(6, 6, 6) + bd.Pos(8) * bd.Box(6, 6, 6) + bd.Box(16, 1, 1)
 
 
-def flanged() -> cq.Workplane:
-    return cq.Workplane().box(6, 6, 6).union(cq.Workplane().box(9, 6, 1.9))
+def flanged() -> bd.Part:
+    return bd.Box(6, 6, 6) + bd.Box(9, 6, 1.9)
 
 
-def parted(made: cq.Workplane, skin: float = SKIN, openings: str | None = None) -> tuple[Part, Hollow]:
+def sides(made: bd.Shape, *names: str) -> list[bd.Face]:
+    """Faces by where they are: the one furthest along an axis, such as ">Z", or those of cylinders."""
+    found: list[bd.Face] = []
+    for name in names:
+        if name == "mantle":
+            found += made.faces().filter_by(bd.GeomType.CYLINDER)
+        else:
+            found.append(made.faces().sort_by(getattr(bd.Axis, name[1]))[-1 if name[0] == ">" else 0])
+    return found
+
+
+def parted(made: bd.Shape, skin: float = SKIN, openings: Sequence[str] = ()) -> tuple[Part, Hollow]:
     part = require_part(wrapped(made))
-    return part, hollow(part, skin, [face.wrapped for face in made.faces(openings).vals()] if openings else [])
+    return part, hollow(part, skin, [face.wrapped for face in sides(made, *openings)])
 
 
 def with_nothing_in_it(made: Hollow, wanted: bool = False) -> list[TopoDS_Solid]:
@@ -80,8 +93,8 @@ def volume(solids: list[TopoDS_Solid]) -> float:
 
 def areas_at(shape: TopoDS_Shape, height: float) -> list[float]:
     """Of the faces that lie in the plane z = height."""
-    faces = [cq.Face(TopoDS.Face_s(face)) for face in parts_of(shape, TopAbs_FACE)]
-    return [face.Area() for face in faces if abs(face.BoundingBox().zmin - height) + face.BoundingBox().zlen < 1e-4]
+    faces = parts_of(shape, TopAbs_FACE)
+    return [measure(face)[1] for face in faces if np.abs(bounding_box(face)[:, 2] - height).max() < 1e-4]
 
 
 def assert_sound(shape: TopoDS_Shape) -> None:
@@ -92,14 +105,14 @@ def assert_sound(shape: TopoDS_Shape) -> None:
 @lru_cache(maxsize=4)
 def filled(name: str) -> tuple[Part, Hollow, TopoDS_Shape, TopoDS_Shape]:
     """A part, its core, skin with wall, and the wall in the core alone."""
-    part, made = parted(*{"ball": (ball(),), "box": (box(), SKIN, ">Z")}[name])
+    part, made = parted(*{"ball": (ball(),), "box": (box(), SKIN, [">Z"])}[name])
     core = made.core
     complex = covering_complex(core.low, core.high, FRAME, CELL, WALL / 2)
     cloud, error = core.surface_samples(CELL / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, CELL, WALL / 2, lambda points: tree.query(points)[0] - error, core.holds)
+    sides = patch_sides(complex, FRAME, CELL, WALL / 2, lambda points: tree.query(points)[0] - error, core.contains)
     wall = build_wall(complex, fit_patch(FitSettings(6)), CELL, WALL).moved(FRAME.rotation, FRAME.origin)
-    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in realise_faces(wall)]
+    faces = [(as_face(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (
         [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
     )
@@ -163,21 +176,21 @@ PLATE = rounded(18, 14, 2) - np.pi * 3.5**2
 @pytest.mark.parametrize(
     ("made", "openings", "core", "solids"),
     [
-        (plate(), None, 4 * PLATE, 1),
-        (plate(), ">Z", 5 * PLATE, 1),
-        (plate(), ">Z or <Z", 6 * PLATE, 1),
-        (plate(), ">X", 4 * PLATE + (10 - 2) * (6 - 2), 1),
-        (box(), ">Z or >X", 8 * 6 * 6, 1),
-        (cq.Workplane().circle(6).extrude(14), "%CYLINDER", 36 * np.pi * 12, 1),
-        (cq.Workplane(obj=cq.Solid.makeTorus(10, 4)), None, 2 * np.pi**2 * 10 * 9, 1),
-        (box().cut(ball(1.5)), None, 7 * 6 * 5 - 4 / 3 * np.pi * 2.5**3, 1),
-        (box().cut(ball(1.5)), ">Z", 7 * 6 * 6 - 4 / 3 * np.pi * 2.5**3, 1),
-        (ball().add(ball().translate((10, 0, 0))), None, 8 / 3 * np.pi * 27, 2),
-        (dumb_bell(), None, None, 2),
+        (plate(), [], 4 * PLATE, 1),
+        (plate(), [">Z"], 5 * PLATE, 1),
+        (plate(), [">Z", "<Z"], 6 * PLATE, 1),
+        (plate(), [">X"], 4 * PLATE + (10 - 2) * (6 - 2), 1),
+        (box(), [">Z", ">X"], 8 * 6 * 6, 1),
+        (bd.Cylinder(6, 14), ["mantle"], 36 * np.pi * 12, 1),
+        (bd.Torus(10, 4), [], 2 * np.pi**2 * 10 * 9, 1),
+        (box() - ball(1.5), [], 7 * 6 * 5 - 4 / 3 * np.pi * 2.5**3, 1),
+        (box() - ball(1.5), [">Z"], 7 * 6 * 6 - 4 / 3 * np.pi * 2.5**3, 1),
+        (ball() + bd.Pos(10) * ball(), [], 8 / 3 * np.pi * 27, 2),
+        (dumb_bell(), [], None, 2),
     ],
     ids=["plate", "top", "both", "side", "corner", "mantle", "torus", "void", "open void", "two", "dumb bell"],
 )
-def test_skin_and_core_are_the_part(made: cq.Workplane, openings: str | None, core: float | None, solids: int) -> None:
+def test_skin_and_core_are_the_part(made: bd.Shape, openings: list[str], core: float | None, solids: int) -> None:
     part, found = parted(made, SKIN, openings)
     skin = with_nothing_in_it(found)
     assert_sound(compound_of(skin))
@@ -193,13 +206,13 @@ def test_skin_and_core_are_the_part(made: cq.Workplane, openings: str | None, co
 
 
 def test_openings_are_found_where_the_part_has_other_faces_than_the_shape_it_was_made_from() -> None:
-    cylinder = cq.Workplane().circle(6).extrude(14)
+    cylinder = bd.Cylinder(6, 14)
     part = require_part(wrapped(cylinder))
-    mantle = cylinder.faces("%CYLINDER").val()
-    for given in (mantle, mantle.copy()):
+    (mantle,) = sides(cylinder, "mantle")
+    for given in (mantle, deepcopy(mantle)):
         found = openings_of(part, [given.wrapped, given.wrapped])
         assert len(found) == 2
-        assert sum(measure(face)[1] for face in found) == pytest.approx(mantle.Area())
+        assert sum(measure(face)[1] for face in found) == pytest.approx(mantle.area)
     assert openings_of(part, []) == []
 
 
@@ -207,32 +220,32 @@ def test_openings_are_found_where_the_part_has_other_faces_than_the_shape_it_was
     ("made", "skin", "openings", "words"),
     [
         (box(), 3.6, [], "skin = 3.6: expected less than about 3.5 mm, half the part where it is thickest"),
-        (box(), 3.9, box().faces(">X or <X").vals(), "skin = 3.9: expected less than about 3.5 mm, as deep as"),
-        (box(), 1.0, box().faces().vals(), "some faces of each solid"),
-        (box(), 1.0, ball().faces().vals(), "openings = '1 face': expected faces of the part"),
-        (box(), 1.0, box().translate((0, 0, 0.01)).faces(">Z").vals(), "expected faces of the part"),
+        (box(), 3.9, sides(box(), ">X", "<X"), "skin = 3.9: expected less than about 3.5 mm, as deep as"),
+        (box(), 1.0, box().faces(), "some faces of each solid"),
+        (box(), 1.0, ball().faces(), "openings = '1 face': expected faces of the part"),
+        (box(), 1.0, sides(bd.Pos(0, 0, 0.01) * box(), ">Z"), "expected faces of the part"),
         (
             flanged(),
             1.0,
-            flanged().faces(">X or <Z").vals(),
+            sides(flanged(), ">X", "<Z"),
             "openings = '2 faces': expected faces wider than rims of 1 mm",
         ),
     ],
 )
 def test_what_leaves_no_core_no_skin_or_no_opening_is_refused(
-    made: cq.Workplane, skin: float, openings: list[cq.Face], words: str
+    made: bd.Shape, skin: float, openings: list[bd.Face], words: str
 ) -> None:
     with pytest.raises(ParameterError) as caught:
         hollow(require_part(wrapped(made)), skin, [face.wrapped for face in openings])
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize("given", [None, box(), cq.Workplane(origin=(5, 5, 5)).box(7.2, 6, 5), ball(2.5)])
-def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatch, given: cq.Workplane | None) -> None:
+@pytest.mark.parametrize("given", [None, box(), box(7.2, 6, 5), ball(2.5)])
+def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatch, given: bd.Shape | None) -> None:
     def wrong(*arguments: Any) -> Iterator[TopoDS_Shape | None]:
         yield from len(CLOSED_WAYS) * [None if given is None else wrapped(given)]
 
-    monkeypatch.setattr(gyroid_cad.kernel.core, "offsets", wrong)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", wrong)
     with pytest.raises(KernelError, match="cannot offset the part by 1 mm; without a skin it can still be filled"):
         parted(box())
 

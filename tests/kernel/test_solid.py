@@ -29,17 +29,16 @@ from OCP.TopAbs import (
 )
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Shape
-from OCP.TopTools import TopTools_IndexedMapOfShape
+from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.kernel.check import enclosed_volume, topology
-from gyroid_cad.kernel.solid import TOLERANCE, another_handle, realise
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_shell, as_vertex
+from gyroid_cad.kernel.solid import TOLERANCE, another_handle, build_solid
 from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.surface.patch import smooth
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import SIDES, Wall, build_wall
 
@@ -62,7 +61,7 @@ def wall_of(cells: Cells, fit: FitSettings = COARSE, placements: Placements | No
 
 @lru_cache(maxsize=32)
 def solid_of(cells: Cells, fit: FitSettings = COARSE, placements: Placements | None = None) -> TopoDS_Shape:
-    return realise(wall_of(cells, fit, placements))
+    return build_solid(wall_of(cells, fit, placements))
 
 
 @lru_cache(maxsize=1)
@@ -73,7 +72,7 @@ def sorted_into_the_cell() -> Placements:
 
 
 def distinct(shape: TopoDS_Shape, kind: object) -> int:
-    found = TopTools_IndexedMapOfShape()
+    found = NumberedShapes()
     TopExp.MapShapes_s(shape, kind, found)
     return int(found.Extent())
 
@@ -88,7 +87,7 @@ def parts(shape: TopoDS_Shape, kind: object) -> list[TopoDS_Shape]:
 
 def surfaces_of(shape: TopoDS_Shape) -> list[Geom_BSplineSurface]:
     """The surface of each face, before the face's own translation."""
-    return [BRep_Tool.Surface_s(TopoDS.Face_s(face), TopLoc_Location()) for face in parts(shape, TopAbs_FACE)]
+    return [BRep_Tool.Surface_s(as_face(face), TopLoc_Location()) for face in parts(shape, TopAbs_FACE)]
 
 
 def euler_characteristic(shape: TopoDS_Shape) -> int:
@@ -132,7 +131,7 @@ def test_a_patch_has_two_faces_and_a_free_edge_has_one(cells: Cells) -> None:
 
 @pytest.mark.parametrize("cells", BLOCKS)
 def test_the_shell_is_the_double_of_the_mid_surface(cells: Cells) -> None:
-    """Two copies of the mid-surface, joined along its border by annuli, whose Euler characteristic is nought."""
+    """Two copies of the mid-surface, joined along its border by annuli, whose Euler characteristic is zero."""
     complex = wall_of(cells).complex
     assert complex.border_fans.sum() == complex.free.sum()  # the border is made of closed curves
     assert euler_characteristic(solid_of(cells)) == 2 * mid_surface_euler_characteristic(wall_of(cells))
@@ -151,7 +150,7 @@ def test_a_cell_among_others_adds_twice_minus_eight_to_the_euler_characteristic(
 @pytest.mark.parametrize("cells", [ONE_CELL, (2, 1, 1)])
 def test_no_vertex_is_further_from_its_edges_than_the_kernels_smallest_distance(cells: Cells) -> None:
     solid = solid_of(cells)
-    for shape, of in ((TopAbs_VERTEX, TopoDS.Vertex_s), (TopAbs_EDGE, TopoDS.Edge_s), (TopAbs_FACE, TopoDS.Face_s)):
+    for shape, of in ((TopAbs_VERTEX, as_vertex), (TopAbs_EDGE, as_edge), (TopAbs_FACE, as_face)):
         assert max(BRep_Tool.Tolerance_s(of(part)) for part in parts(solid, shape)) == TOLERANCE
     assert valid(solid)
 
@@ -183,10 +182,10 @@ def sewn(wall: Wall) -> BRepBuilderAPI_Sewing:
 def test_sewing_the_faces_of_a_bounding_cell_gives_the_same_solid() -> None:
     placements = bounding_cell(USUAL.patch)
     wall, built = wall_of(ONE_CELL, COARSE, placements), solid_of(ONE_CELL, COARSE, placements)
-    assert wall.complex.pinch_lines == 0
+    assert wall.complex.non_manifold_edges == 0
     sewing = sewn(wall)
     assert sewing.NbFreeEdges() == 0
-    solid = BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(sewing.SewedShape())).Solid()
+    solid = BRepBuilderAPI_MakeSolid(as_shell(sewing.SewedShape())).Solid()
     assert valid(solid)
     for kind in (TopAbs_FACE, TopAbs_EDGE, TopAbs_VERTEX):
         assert distinct(solid, kind) == distinct(built, kind)
@@ -223,7 +222,7 @@ def test_pieces_that_touch_in_lines_only_are_solids_of_their_own(cells: Cells) -
     assert len(solids) == wall.complex.component_count
     assert all(valid(solid) and enclosed_volume(solid) > 0 for solid in solids)
     assert sum(map(enclosed_volume, solids)) == pytest.approx(wall.volume(), rel=1e-12)
-    vertices = TopTools_IndexedMapOfShape()
+    vertices = NumberedShapes()
     for solid in solids:
         TopExp.MapShapes_s(solid, TopAbs_VERTEX, vertices)
     assert vertices.Extent() == sum(distinct(solid, TopAbs_VERTEX) for solid in solids)
@@ -252,9 +251,7 @@ def test_moving_one_handle_leaves_the_others_where_they_are(placements: Placemen
 
 
 def test_translated_copies_of_a_patch_share_their_geometry_in_the_kernel() -> None:
-    surfaces = [
-        BRep_Tool.Surface_s(TopoDS.Face_s(f), TopLoc_Location()) for f in parts(solid_of((3, 2, 2)), TopAbs_FACE)
-    ]
+    surfaces = [BRep_Tool.Surface_s(as_face(f), TopLoc_Location()) for f in parts(solid_of((3, 2, 2)), TopAbs_FACE)]
     faces = {id(surface) for surface in surfaces if surface.VDegree() == 3}
     assert len(faces) == len(SIDES) * len(USUAL.cell)
 
@@ -279,7 +276,7 @@ def test_a_line_along_the_exact_normal_passes_through_one_thickness_of_wall(
 
 def test_progress_rises_to_the_number_of_patches() -> None:
     told: list[tuple[int, int]] = []
-    realise(wall_of((2, 2, 1)), lambda done, total: told.append((done, total)))
+    build_solid(wall_of((2, 2, 1)), lambda done, total: told.append((done, total)))
     assert told == sorted(told)
     assert {total for _, total in told} == {wall_of((2, 2, 1)).complex.patch_count}
     assert told[-1][0] == told[-1][1]

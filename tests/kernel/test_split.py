@@ -11,13 +11,14 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import measure, require_part
-from gyroid_cad.kernel.solid import realise, realise_faces
+from gyroid_cad.kernel.solid import build_faces, build_solid
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import build_complex
@@ -45,9 +46,9 @@ def filled(shape: TopoDS_Shape) -> TopoDS_Shape:
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
     cloud, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.holds)
+    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.contains)
     wall = build_wall(complex, fit_patch(COARSE), L, THICKNESS).moved(FRAME.rotation, FRAME.origin)
-    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in realise_faces(wall)]
+    faces = [(as_face(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (
         [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
     )
@@ -59,7 +60,7 @@ def filled(shape: TopoDS_Shape) -> TopoDS_Shape:
 def lattice() -> TopoDS_Shape:
     """A block that covers the parts, for the kernel's own boolean."""
     wall = build_wall(build_complex((3, 3, 3), first=(-1, -1, -1)), fit_patch(COARSE), L, THICKNESS)
-    return realise(wall.moved(FRAME.rotation, FRAME.origin))
+    return build_solid(wall.moved(FRAME.rotation, FRAME.origin))
 
 
 @pytest.mark.parametrize(
@@ -81,11 +82,11 @@ def test_a_filled_part_is_what_the_boolean_of_the_whole_lattice_gives(shape: Top
 
 
 def faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
-    return [TopoDS.Face_s(face) for face in parts_of(shape, TopAbs_FACE)]
+    return [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
 
 
 def reversed_faces(shape: TopoDS_Shape) -> tuple[TopoDS_Face, ...]:
-    return tuple(TopoDS.Face_s(face.Reversed()) for face in faces_of(shape))
+    return tuple(as_face(face.Reversed()) for face in faces_of(shape))
 
 
 def test_with_no_faces_the_boundary_stays_whole() -> None:
@@ -122,4 +123,4 @@ def test_faces_that_do_not_close_are_an_error() -> None:
 def test_faces_that_disagree_on_what_is_inside_are_an_error() -> None:
     box = faces_of(BRepPrimAPI_MakeBox(1, 1, 1).Shape())
     with pytest.raises(KernelError, match="do not agree"):
-        bounded_solids(Pieces((box[0], TopoDS.Face_s(box[1].Reversed())), tuple(box[2:])), (), never)
+        bounded_solids(Pieces((box[0], as_face(box[1].Reversed())), tuple(box[2:])), (), never)

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from gyroid_cad.common.formats import SCHEMAS, require_schema
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
-from gyroid_cad.kernel.solid import TOLERANCE, realise
+from gyroid_cad.kernel.solid import TOLERANCE, build_solid
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import USUAL
@@ -217,7 +217,7 @@ def test_pieces_come_back_as_solids_of_their_own(tmp_path: Path) -> None:
     placements = USUAL.cell
     scattered = replace(placements, translations=placements.translations % CELL_QUARTERS)
     wall = build_wall(build_complex((1, 1, 1), scattered), fit_patch(FitSettings(4)), 10.0, 0.8)
-    write_step(realise(wall), tmp_path / "pieces.step")
+    write_step(build_solid(wall), tmp_path / "pieces.step")
     assert not dangling_references(tmp_path / "pieces.step")
     back = read_step(tmp_path / "pieces.step")
     assert topology(back).solids == wall.complex.component_count > 1

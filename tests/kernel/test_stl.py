@@ -64,7 +64,7 @@ def test_the_mesh_is_closed_and_consistent_though_the_wall_touches_itself_in_lin
 ) -> None:
     lattice = Lattice(cells, 10.0, 0.8, fit=FitSettings(5))
     complex = lattice.wall().complex
-    assert complex.pinch_lines > 0
+    assert complex.non_manifold_edges > 0
     mesh = meshed(lattice, tmp_path, 0.1)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent

@@ -20,7 +20,7 @@ from gyroid_cad.maps.space import BlockMap, Size, SpaceMap, carried, differences
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.exact import exact_measures
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.refit import fitted_wall
+from gyroid_cad.wall.refit import graded_wall
 
 Floats = NDArray[np.float64]
 
@@ -275,7 +275,7 @@ def test_a_map_without_its_jacobian_carries_to_the_same_lattice(
     complex = build_complex(cells, closed=known.closed)
     gradings = [Grading(SIZE, 0.8, map=space) for space in (known, SpaceMap(known.function, closed=known.closed))]
     # That each patch's edges are its neighbours' is part of the fit.
-    nets = [fitted_wall(complex, grading, 10).nets for grading in gradings]
+    nets = [graded_wall(complex, grading, 10).nets for grading in gradings]
     np.testing.assert_allclose(nets[0], nets[1], rtol=0, atol=1e-8 * SIZE)
     measures = [exact_measures(complex, grading) for grading in gradings]
     assert measures[0].volume == pytest.approx(measures[1].volume, rel=1e-9)

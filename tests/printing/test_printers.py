@@ -16,17 +16,17 @@ OWN = """
 name = "Big"
 process = "resin"
 build_volume = [300, 200.5, 400]
-smallest_supported_wall = 0.3
-smallest_unsupported_wall = 0.5
-smallest_drain_hole = 4
+min_supported_wall = 0.3
+min_unsupported_wall = 0.5
+min_drain_hole = 4
 """
 
 
 def test_the_form_2_is_as_its_maker_describes_it() -> None:
     printer = printer_named("form2")
     assert printer.build_volume == (145.0, 145.0, 175.0)
-    assert (printer.smallest_supported_wall, printer.smallest_unsupported_wall) == (0.4, 0.6)
-    assert printer.smallest_drain_hole == 3.5
+    assert (printer.min_supported_wall, printer.min_unsupported_wall) == (0.4, 0.6)
+    assert printer.min_drain_hole == 3.5
 
 
 def test_every_table_of_the_packages_file_is_a_printer() -> None:
@@ -38,7 +38,7 @@ def test_every_table_of_the_packages_file_is_a_printer() -> None:
 def test_a_file_of_ones_own_is_read(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text(OWN)
     printer = printer_named(str(tmp_path / "own.toml"))
-    assert (printer.key, printer.build_volume, printer.smallest_drain_hole) == ("big", (300.0, 200.5, 400.0), 4.0)
+    assert (printer.key, printer.build_volume, printer.min_drain_hole) == ("big", (300.0, 200.5, 400.0), 4.0)
 
 
 def test_an_unknown_name_is_told_those_that_are_known() -> None:
@@ -55,9 +55,9 @@ def test_an_unknown_name_is_told_those_that_are_known() -> None:
         ('"Big"', "3", "big.name = 3: expected text"),
         ("[300, 200.5, 400]", "[300, 200]", "big.build_volume = [300, 200]: expected three lengths"),
         ("[300, 200.5, 400]", "[300, 200, 0]", "big.build_volume = [300, 200, 0]"),
-        ("= 0.3", '= "thin"', "big.smallest_supported_wall = 'thin': expected a length in mm"),
-        ("= 4", "= -4", "big.smallest_drain_hole = -4"),
-        ("= 4", "= inf", "big.smallest_drain_hole = inf"),
+        ("= 0.3", '= "thin"', "big.min_supported_wall = 'thin': expected a length in mm"),
+        ("= 4", "= -4", "big.min_drain_hole = -4"),
+        ("= 4", "= inf", "big.min_drain_hole = inf"),
         ("= 4", "= = 4", "expected TOML"),
         ("[big]", "[small]\n[big]", "small = []: expected the key name as well"),
         ("[big]", "big = 3\n[other]", "big = 3: expected a table that describes a printer"),

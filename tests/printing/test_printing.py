@@ -19,7 +19,7 @@ from gyroid_cad.printing.printers import printer_named
 from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.complex import build_complex
-from gyroid_cad.wall.pore_limits import throat_diameter
+from gyroid_cad.wall.pore_limits import pore_limiting_diameter
 
 FORM2 = printer_named("form2")
 COARSE = FitSettings(5)
@@ -66,7 +66,7 @@ def test_a_part_that_fits_as_it_stands_is_not_turned() -> None:
 )
 def test_the_smallest_wall_is_held_against_both_limits(thickness: float, wall: str, passed: bool) -> None:
     check = print_check(lattice(thickness=thickness))
-    assert (check.smallest_wall, check.wall, check.passed) == (thickness, wall, passed)
+    assert (check.min_wall, check.wall, check.passed) == (thickness, wall, passed)
 
 
 def test_at_the_scale_that_is_told_the_wall_passes() -> None:
@@ -88,7 +88,7 @@ def test_no_scale_is_suggested_where_what_fits_has_too_thin_a_wall() -> None:
 def test_where_walls_vary_the_thinnest_counts() -> None:
     graded = lattice(cells=(2, 1, 1), thickness="0.3 + 0.02*x", tolerance=1e-2)
     check = print_check(graded)
-    assert check.smallest_wall == graded.laid().thinnest
+    assert check.min_wall == graded.fitted().min_thickness
     assert check.wall == "too thin"
 
 
@@ -97,7 +97,7 @@ def test_a_lattices_channels_are_held_against_the_drain_hole(surface: str) -> No
     small, large = (
         print_check(lattice(cell_size=size, surface=surface, thickness=0.1 * size)) for size in (10.0, 20.0)
     )
-    expected = throat_diameter(SURFACES[surface], 10.0, 1.0)
+    expected = pore_limiting_diameter(SURFACES[surface], 10.0, 1.0)
     assert small.opening == pytest.approx(expected)
     assert large.opening == pytest.approx(2 * expected)
     assert (small.drains, large.drains) == (expected >= 3.5, 2 * expected >= 3.5)
@@ -107,7 +107,7 @@ def test_a_lattices_channels_are_held_against_the_drain_hole(surface: str) -> No
 def test_a_cut_lattice_is_of_the_blocks_size_and_of_the_same_channels() -> None:
     check = print_check(lattice(trim="box", cell_size=12.0, thickness=1.0))
     assert check.size == pytest.approx((12.0, 12.0, 12.0), abs=1e-3)
-    assert check.opening == pytest.approx(throat_diameter(SURFACES["gyroid"], 12.0, 1.0))
+    assert check.opening == pytest.approx(pore_limiting_diameter(SURFACES["gyroid"], 12.0, 1.0))
     assert (check.trapped_voids, check.open_edges) == (0, 0)
 
 
@@ -127,7 +127,7 @@ def test_a_lattices_own_stl_says_what_the_lattice_says(tmp_path: Path) -> None:
     by_file, by_lattice = print_check(path), print_check(made, deviation=0.02)
     assert by_file.size == pytest.approx(by_lattice.size, abs=0.02)
     assert by_file.triangles == by_lattice.triangles
-    assert by_file.smallest_wall == pytest.approx(0.8, abs=0.04)
+    assert by_file.min_wall == pytest.approx(0.8, abs=0.04)
     assert (by_file.pieces, by_file.trapped_voids, by_file.open_edges) == (1, 0, 0)
     assert by_file.opening is None
     assert by_file.drains is None
@@ -159,7 +159,7 @@ def test_the_dictionary_is_plain_and_the_rows_name_units_and_printer_limits() ->
 
 
 def test_a_printed_scale_is_never_rounded_to_where_it_would_fail() -> None:
-    check = replace(of_box(200, 20, 20), scale_to_fit=0.87499, smallest_wall=0.1, scale_for_supported_wall=4.0003)
+    check = replace(of_box(200, 20, 20), scale_to_fit=0.87499, min_wall=0.1, scale_for_supported_wall=4.0003)
     rows = {subject: verdict for subject, _, verdict in check.rows()}
     assert rows["build volume"] == "too large: scale by 0.874"
     assert "from a scale of 4.01" in rows["smallest wall"]

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.report.distributions import distribution_of
 from gyroid_cad.report.pores import Pores, inscribed_spheres, pores_of
+from gyroid_cad.report.wall_thickness import distribution_of
 from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.patch import PARAMETERISATIONS
@@ -30,17 +30,17 @@ FIT = {"gyroid": 2e-5, "diamond": 5e-7, "primitive": 2e-5}
 def spheres(
     surface: str = "gyroid", wall: float = WALL, size: float = SIZE
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    return inscribed_spheres(Lattice((1, 1, 1), size, wall, surface=surface).laid())
+    return inscribed_spheres(Lattice((1, 1, 1), size, wall, surface=surface).fitted())
 
 
 @pytest.fixture(scope="module")
 def gyroid() -> Pores:
-    return pores_of(Lattice((3, 2, 1), SIZE, WALL).laid())
+    return pores_of(Lattice((3, 2, 1), SIZE, WALL).fitted())
 
 
 def exact_distance(surface: str, place: Floats) -> float:
     """From a place to the exact endless surface, by searching the Weierstrass map: no NURBS, no tree."""
-    complex = Lattice((1, 1, 1), SIZE, WALL, surface=surface).laid().complex
+    complex = Lattice((1, 1, 1), SIZE, WALL, surface=surface).fitted().complex
     grid = patch_points(complex, SIZE, np.linspace(-1, 1, 7)).reshape(-1, 3)
     images = np.round((place - grid) / SIZE) * SIZE
     gaps = np.linalg.norm(place - grid - images, axis=1)
@@ -75,9 +75,9 @@ def test_spheres_of_diamond_and_primitive_touch_the_flat_points_on_the_threefold
 
 
 def test_the_gyroid_s_spheres_are_as_large_as_their_centres_are_far_from_the_exact_surface() -> None:
-    centres, radii, channels = inscribed_spheres(Lattice((1, 1, 1), SIZE, WALL, fit=FitSettings(20)).laid())
+    centres, radii, channels = inscribed_spheres(Lattice((1, 1, 1), SIZE, WALL, fit=FitSettings(20)).fitted())
     assert np.bincount(channels).tolist() == [12, 12]
-    # In the middle of the labyrinths' edges, on twofold axes: multiples of an eighth of the cell.
+    # In the middle of the networks' edges, on twofold axes: multiples of an eighth of the cell.
     eighths = centres / (SIZE / 8)
     assert eighths == pytest.approx(np.round(eighths), abs=1e-3)
     for first in (0, 13):
@@ -116,7 +116,7 @@ def test_pores_scale_with_the_cell() -> None:
 def test_faces_with_weights_have_the_pores_of_those_without() -> None:
     weights = tuple(tuple(1 + 0.1 * ((i * j) % 3) for j in (0, 1, 2, 3, 3, 2, 1, 0)) for i in (0, 1, 2, 3, 3, 2, 1, 0))
     found = [
-        inscribed_spheres(Lattice((1, 1, 1), SIZE, WALL, fit=FitSettings(8, weights=some)).laid())[1].max()
+        inscribed_spheres(Lattice((1, 1, 1), SIZE, WALL, fit=FitSettings(8, weights=some)).fitted())[1].max()
         for some in (None, weights)
     ]
     assert found[0] == pytest.approx(found[1], abs=1e-3)
@@ -124,7 +124,7 @@ def test_faces_with_weights_have_the_pores_of_those_without() -> None:
 
 def test_how_many_cells_there_are_does_not_matter_where_all_are_alike(gyroid: Pores) -> None:
     assert gyroid.beyond == "endless"
-    assert pores_of(Lattice((1, 1, 1), SIZE, WALL).laid()).sizes.as_dict() == gyroid.sizes.as_dict()
+    assert pores_of(Lattice((1, 1, 1), SIZE, WALL).fitted()).sizes.as_dict() == gyroid.sizes.as_dict()
 
 
 def test_what_is_no_wall_is_pore(gyroid: Pores) -> None:
@@ -149,7 +149,7 @@ def test_no_pore_is_larger_than_the_largest_sphere_and_the_share_of_these_is_the
 
 def test_a_field_that_does_not_vary_leaves_the_pores_as_they_are(gyroid: Pores) -> None:
     lattice = Lattice((1, 1, 1), SIZE, "0.8 + 0*x", fit=FitSettings(8))
-    found = pores_of(lattice.laid())
+    found = pores_of(lattice.fitted())
     assert found.beyond == "continued"
     assert found.sizes.largest == pytest.approx(gyroid.sizes.largest, rel=2e-3)
     assert found.sizes.mean == pytest.approx(gyroid.sizes.mean, rel=0.02)
@@ -164,7 +164,7 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("few_places")
 def test_a_wall_that_would_be_gone_beyond_the_lattice_stays_as_it_ends(gyroid: Pores) -> None:
     lattice = Lattice((1, 1, 1), SIZE, lambda x, y, z: np.where(z < 13.5, WALL, -1.0), fit=FitSettings(8))
-    found = pores_of(lattice.laid())
+    found = pores_of(lattice.fitted())
     assert found.beyond == "continued"
     assert found.sizes.largest == pytest.approx(gyroid.sizes.largest, rel=2e-3)
 
@@ -173,7 +173,7 @@ def test_a_wall_that_would_be_gone_beyond_the_lattice_stays_as_it_ends(gyroid: P
 def test_where_a_map_ends_near_the_lattice_its_sides_are_open() -> None:
     # Half a cell beneath the block the cylinder has no radius left.
     lattice = Lattice((1, 1, 1), SIZE, WALL, map="cylinder:radius=6", fit=FitSettings(8))
-    assert pores_of(lattice.laid()).beyond == "open"
+    assert pores_of(lattice.fitted()).beyond == "open"
 
 
 def test_a_distribution_s_shares_are_of_the_weights() -> None:

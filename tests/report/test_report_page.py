@@ -8,7 +8,7 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,12 +17,13 @@ from typing import Any
 
 import cadquery as cq
 import pytest
+import trimesh
 
 from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.cli.app import main
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.report.page import page_of, write_page
-from gyroid_cad.report.sections import FILE_SECTIONS, LATTICE_SECTIONS, Report, report_on_lattice
+from gyroid_cad.report.sections import FILE_SECTIONS, LATTICE_SECTIONS, Report, report_on_file, report_on_lattice
 
 Captured = pytest.CaptureFixture[str]
 
@@ -132,7 +133,12 @@ def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytes
     monkeypatch.setitem(
         LATTICE_SECTIONS,
         "print_check",
-        lambda subject: {"printer": "resin", "fits": True, "walls": [{"thinnest": 0.5, "fine": False}], "layers": 3},
+        lambda subject: {
+            "printer": "resin",
+            "fits": True,
+            "walls": [{"min_thickness": 0.5, "fine": False}],
+            "layers": 3,
+        },
     )
     for name in ("measures", "wall", "pores", "fit", "quality"):
         monkeypatch.delitem(LATTICE_SECTIONS, name)
@@ -140,7 +146,7 @@ def test_a_section_the_page_does_not_know_is_shown_as_a_table(monkeypatch: pytes
     page = page_of(report)
     assert "<h2>Print check</h2>" in page
     assert "resin" in page
-    assert Page(page).numbers["print_check.walls.0.thinnest"] == "0.5"
+    assert Page(page).numbers["print_check.walls.0.min_thickness"] == "0.5"
     assert Page(page).numbers["print_check.fits"] == "true"
     assert report.as_dict()["print_check"]["layers"] == 3
 
@@ -169,7 +175,6 @@ def test_a_file_of_a_part_is_told_by_its_size_its_faces_or_triangles_and_whether
 ) -> None:
     part, page = tmp_path / f"part.{ending}", tmp_path / "part.html"
     if ending in ("stl", "3mf"):
-        trimesh = pytest.importorskip("trimesh")
         trimesh.creation.box(extents=(1, 2, 3)).export(part)
     else:
         shape = cq.Workplane().box(1, 2, 3)
@@ -185,6 +190,31 @@ def test_a_file_of_a_part_is_told_by_its_size_its_faces_or_triangles_and_whether
     assert (found["triangles"] == 12) if ending in ("stl", "3mf") else (found["faces"] == 6 and found["valid"])
     assert all(json.loads(value) == looked_up(values, key) for key, value in Page(page.read_text()).numbers.items())
     assert Page(page.read_text()).tags.count("img") == 4
+
+
+def hollow_ball() -> trimesh.Trimesh:
+    void = trimesh.creation.icosphere(1, 1.0)
+    void.invert()
+    return trimesh.util.concatenate([trimesh.creation.icosphere(1, 3.0), void])
+
+
+def cubes_that_touch_in_a_vertex() -> trimesh.Trimesh:
+    corners = ([[0, 0, 0], [1, 1, 1]], [[1, 1, 1], [2, 2, 2]])
+    return trimesh.util.concatenate([trimesh.creation.box(bounds=bounds) for bounds in corners])
+
+
+def open_face() -> trimesh.Trimesh:
+    return trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [3, 3, 1]], [[0, 1, 2], [1, 3, 2]])
+
+
+@pytest.mark.parametrize(("part", "pieces"), [(hollow_ball, 1), (cubes_that_touch_in_a_vertex, 2), (open_face, 1)])
+def test_a_file_s_pieces_are_one_number_on_the_whole_page(
+    tmp_path: Path, part: Callable[[], trimesh.Trimesh], pieces: int
+) -> None:
+    part().export(tmp_path / "part.stl")
+    sections = report_on_file(str(tmp_path / "part.stl")).sections
+    checked = [row["finding"] for row in sections["print_check"]["findings"] if row["of"] == "pieces"]
+    assert [sections["file"]["pieces"], *checked] == [pieces, str(pieces)]
 
 
 @pytest.mark.parametrize(

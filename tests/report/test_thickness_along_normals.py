@@ -15,8 +15,8 @@ from gyroid_cad.surface.fit import FitSettings
 def test_areas_of_the_faces_are_the_tube_formula_s(surface: str) -> None:
     lattice = Lattice((2, 1, 1), 10.0, 1.2, surface=surface)
     expected = 2 * 100 * lattice.minimal_surface.tube.face_area(0.12)
-    exact = exact_areas(lattice.laid())
-    fitted, _ = fitted_areas(lattice.laid())
+    exact = exact_areas(lattice.fitted())
+    fitted, _ = fitted_areas(lattice.fitted())
     assert exact.face_a == pytest.approx(expected, rel=1e-7)
     assert exact.face_b == pytest.approx(expected, rel=1e-7)
     assert fitted.face_a == pytest.approx(expected, rel=1e-6)
@@ -25,20 +25,20 @@ def test_areas_of_the_faces_are_the_tube_formula_s(surface: str) -> None:
 
 def test_faces_and_rim_are_all_of_the_solid_s_area() -> None:
     lattice = Lattice((1, 1, 1), 10.0, 0.8)
-    fitted, rim = fitted_areas(lattice.laid())
+    fitted, rim = fitted_areas(lattice.fitted())
     # The kernel's own integral of the area of its solid.
     assert fitted.face_a + fitted.face_b + rim == pytest.approx(measure(lattice.solid())[1], rel=1e-4)
 
 
 def test_the_wall_s_error_falls_with_the_fourth_order_of_the_control_points_spacing() -> None:
-    found = [wall_thickness(Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(n)).laid()).error for n in (10, 20)]
+    found = [wall_thickness(Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(n)).fitted()).error for n in (10, 20)]
     worst = [max(-error.smallest, error.largest) for error in found]
     order = np.log(worst[0] / worst[1]) / np.log(17 / 7)
     assert 3.5 < order < 5.5
 
 
 def test_a_wall_that_grows_evenly_has_the_thicknesses_asked_for() -> None:
-    found = wall_thickness(Lattice((2, 1, 1), 10.0, "0.8 + 0.02*x").laid()).thickness
+    found = wall_thickness(Lattice((2, 1, 1), 10.0, "0.8 + 0.02*x").fitted()).thickness
     low, high = 0.8 + 0.02 * -2.5, 0.8 + 0.02 * 22.5
     assert found.smallest == pytest.approx(low, abs=1e-3)
     assert found.largest == pytest.approx(high, abs=1e-3)
@@ -48,7 +48,7 @@ def test_a_wall_that_grows_evenly_has_the_thicknesses_asked_for() -> None:
 
 
 def test_a_lattice_cut_to_its_block_is_measured_inside_it() -> None:
-    found = wall_thickness(Lattice((1, 1, 1), 10.0, "0.8 + 0.02*x", trim="box").laid()).thickness
+    found = wall_thickness(Lattice((1, 1, 1), 10.0, "0.8 + 0.02*x", trim="box").fitted()).thickness
     # To the tolerance of the fit.
     assert 0.7995 < found.smallest < 0.81
     assert 0.99 < found.largest < 1.0005

@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.surface.families import SURFACES, USUAL, MinimalSurface, surface_named
-from gyroid_cad.surface.fit import FitSettings, edge_gap, fit_patch, fit_report
+from gyroid_cad.surface.fit import FitSettings, edge_gap, fit_patch
+from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.surface.patch import EDGE_HALF_TURN, ROTOINVERSION, edge_half_turn_shift, exact_edge, smooth
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Neighbour, Patch, orbit, placed_corners
 from gyroid_cad.surface.weierstrass import GYROID, Family

@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.patch import smooth
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements, placed_corners
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, QUARTER, Placements, bounding_cell, placed_corners
 
 Floats = NDArray[np.float64]
 EdgeUses = dict[object, list[tuple[int, int]]]

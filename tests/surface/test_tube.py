@@ -44,7 +44,7 @@ def test_density_and_thickness_are_inverse(surface: MinimalSurface, part: float)
 @given(part=parts)
 def test_thickness_and_density_are_inverse(surface: MinimalSurface, part: float) -> None:
     tube = surface.tube
-    density = part * tube.largest_density
+    density = part * tube.max_density
     assert tube.density(tube.thickness(density)) == pytest.approx(density, rel=1e-9, abs=1e-15)
 
 
@@ -124,4 +124,4 @@ def test_the_surface_is_nowhere_more_curved_than_at_patch_centres(
 def test_faces_shrink_to_points_nowhere_before_the_limit(surface: MinimalSurface) -> None:
     tube = surface.tube
     assert 0 < tube.face_area(tube.thickness_limit) < tube.area
-    assert tube.density(tube.largest_thickness) == tube.largest_density < 1
+    assert tube.density(tube.max_thickness) == tube.max_density < 1

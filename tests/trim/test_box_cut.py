@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, FittedPatch, fit_patch
-from gyroid_cad.trim.box import Box, BoxedWall, cut_to_box
+from gyroid_cad.trim.box import Box, TrimmedWall, cut_to_box
 from gyroid_cad.trim.caps import Cap
 from gyroid_cad.trim.edge_crossings import PLANES
 from gyroid_cad.wall.covering import AT_HOME, Frame, covering_complex, periodic_offsets
@@ -39,7 +39,7 @@ def patch(control_points: int = 6) -> FittedPatch:
 
 def cut(
     low: Floats, extent: Floats, thickness: float, sides: list[tuple[int, bool]], frame: Frame = AT_HOME, fine: int = 6
-) -> BoxedWall:
+) -> TrimmedWall:
     high = low + extent
     complex = covering_complex(low, high, frame, L, thickness / 2)
     wall = build_wall(complex, patch(fine), L, thickness).moved(frame.rotation, frame.origin)
@@ -56,7 +56,7 @@ def volume(*arguments: object, **more: object) -> float:
         reject()
 
 
-def uses_of(made: BoxedWall) -> Counter[tuple[int, bool]]:
+def uses_of(made: TrimmedWall) -> Counter[tuple[int, bool]]:
     """How often each edge is used either way, seen from outside what is left."""
     loops = [(loop, face.backwards) for face in made.faces for loop in face.loops]
     loops += [(loop, False) for cap in made.caps for loop in cap.loops]
@@ -122,7 +122,7 @@ def test_every_edge_is_used_once_each_way_and_ends_where_its_neighbours_begin(
     assert np.all(points < low + extent + 1e-6 * L)
 
 
-def caps_on(made: BoxedWall, plane: int) -> list[Cap]:
+def caps_on(made: TrimmedWall, plane: int) -> list[Cap]:
     return [cap for cap in made.caps if cap.plane == plane]
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.loops import holds, linked, nested, signed_area
+from gyroid_cad.trim.loops import contains, linked, nested, signed_area
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def test_a_polygon_run_backwards_has_the_opposite_area(x: float, radius: float) 
 def test_a_place_is_held_as_by_the_circle_that_a_polygon_stands_for(x: float, y: float) -> None:
     distance = np.hypot(x - 0.5, y)
     if abs(distance - 1.5) > 1e-3:
-        assert holds(circle(1.5, 0.5), np.array([x, y])) == (distance < 1.5)
+        assert contains(circle(1.5, 0.5), np.array([x, y])) == (distance < 1.5)
 
 
 def test_a_hole_goes_to_the_innermost_loop_round_it() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.edge_crossings import Faces, plane_heights, rim_crossings
+from gyroid_cad.trim.edge_crossings import Faces, edge_crossings, plane_heights
 from gyroid_cad.trim.sections import Sections, plane_sections, section_knots
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ SIZE = 1.0
 
 
 def sections_of(faces: Faces) -> Sections:
-    return plane_sections(faces, rim_crossings(faces), SIZE)
+    return plane_sections(faces, edge_crossings(faces), SIZE)
 
 
 def misses(faces: Faces, sections: Sections, curve: int) -> tuple[Floats, Floats]:

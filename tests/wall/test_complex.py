@@ -7,13 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, placed_corners
-from gyroid_cad.wall import complex as complex_module
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, bounding_cell, placed_corners
 from gyroid_cad.wall.complex import CellComplex, build_complex
 
 SIDE = st.integers(1, 3)
@@ -77,10 +73,10 @@ def test_fans_close_with_six_patches_or_end_at_two_free_edges(
 ) -> None:
     lattice = build_complex(cells, placements)
     patches = np.bincount(lattice.patch_fans.ravel(), minlength=lattice.fan_count)
-    free_edges = np.bincount(lattice.edge_fans[lattice.free].ravel(), minlength=lattice.fan_count)
+    boundary_edges = np.bincount(lattice.edge_fans[lattice.free].ravel(), minlength=lattice.fan_count)
     assert np.all(patches[~lattice.border_fans] == 6)
     assert np.all(patches[lattice.border_fans] < 6)
-    np.testing.assert_array_equal(free_edges, np.where(lattice.border_fans, 2, 0))
+    np.testing.assert_array_equal(boundary_edges, np.where(lattice.border_fans, 2, 0))
     # A fan of n patches has n edges if it closes, else n + 1.
     edges = np.bincount(lattice.edge_fans.ravel(), minlength=lattice.fan_count)
     np.testing.assert_array_equal(edges, patches + lattice.border_fans)
@@ -92,7 +88,7 @@ def test_the_walls_surface_is_closed(cells: tuple[int, int, int], placements: Pl
     lattice = build_complex(cells, placements)
     free, border = int(lattice.free.sum()), int(lattice.border_fans.sum())
     assert border == free
-    # Two faces a patch and one a free edge; two edges an edge and one through the wall a border fan.
+    # Two faces a patch and one a boundary edge; two edges an edge and one through the wall a border fan.
     faces, edges, vertices = 2 * lattice.patch_count + free, 2 * lattice.edge_count + border, 2 * lattice.fan_count
     assert 4 * faces == 2 * edges
     assert vertices - edges + faces == 2 * euler_characteristic(lattice)
@@ -158,7 +154,7 @@ def test_pinch_lines_are_corners_with_several_fans() -> None:
     fans = np.bincount(lattice.fan_corner)
     assert fans.min() == 1
     assert lattice.fan_count == len(lattice.corner_quarters) + int(np.sum(fans - 1))
-    assert lattice.pinch_lines == int(np.sum(fans > 1)) > 0
+    assert lattice.non_manifold_edges == int(np.sum(fans > 1)) > 0
 
 
 def test_patches_that_touch_only_in_a_line_are_different_components() -> None:
@@ -166,13 +162,13 @@ def test_patches_that_touch_only_in_a_line_are_different_components() -> None:
     assert lattice.component_count == 2
     # The pieces meet at corners, though at none of them by an edge.
     first, second = (set(lattice.patch_corners[lattice.patch_component == c].ravel().tolist()) for c in (0, 1))
-    assert 0 < len(first & second) <= lattice.pinch_lines
+    assert 0 < len(first & second) <= lattice.non_manifold_edges
 
 
 @pytest.mark.parametrize(("cells", "pinches", "free"), [((2, 2, 1), 15, None), ((4, 3, 2), 49, 450)])
 def test_known_pinches_of_another_arrangement(cells: tuple[int, int, int], pinches: int, free: int | None) -> None:
     lattice = build_complex(cells, with_the_fourth_bounding_cell_one_period_up())
-    assert lattice.pinch_lines == pinches
+    assert lattice.non_manifold_edges == pinches
     assert free is None or int(lattice.free.sum()) == free
     assert lattice.component_count == 1
 
@@ -189,16 +185,6 @@ def test_placements_that_pass_an_edge_to_three_patches_are_refused() -> None:
     thrice = cell.joined(first)
     with pytest.raises(ValueError, match="more than two patches"):
         build_complex((1, 1, 1), thrice)
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(1, 60), st.integers(0, 90), st.integers(0, 2**32 - 1))
-def test_components_are_those_of_scipys_graphs(nodes: int, links: int, seed: int) -> None:
-    first, second = np.random.default_rng(seed).integers(0, nodes, (2, links))
-    ours = complex_module.connected(nodes, first, second)
-    graph = coo_array((np.ones(links), (first, second)), shape=(nodes, nodes))
-    count, theirs = connected_components(graph, directed=False)
-    assert len(set(zip(ours.tolist(), theirs.tolist(), strict=True))) == count == ours.max() + 1
 
 
 Cells = tuple[int, int, int]
@@ -245,9 +231,9 @@ def test_a_closed_complex_is_a_two_manifold_too(cells: Cells, closed: Closed) ->
     assert set(np.bincount(lattice.patch_edges.ravel()).tolist()) <= {1, 2}
     np.testing.assert_array_equal(lattice.fan_corner[lattice.patch_fans], lattice.patch_corners)
     patches = np.bincount(lattice.patch_fans.ravel(), minlength=lattice.fan_count)
-    free_edges = np.bincount(lattice.edge_fans[lattice.free].ravel(), minlength=lattice.fan_count)
+    boundary_edges = np.bincount(lattice.edge_fans[lattice.free].ravel(), minlength=lattice.fan_count)
     assert np.all(patches[~lattice.border_fans] == 6)
-    np.testing.assert_array_equal(free_edges, np.where(lattice.border_fans, 2, 0))
+    np.testing.assert_array_equal(boundary_edges, np.where(lattice.border_fans, 2, 0))
     sense = np.zeros(lattice.edge_count, dtype=int)
     np.add.at(sense, lattice.patch_edges, np.where(lattice.edge_forward, 1, -1))
     assert np.all(sense[~lattice.free] == 0)
@@ -274,4 +260,4 @@ def test_closed_all_round_the_surface_has_no_border_and_its_periods_euler_charac
     # Twenty-four quadrangles, two to an edge, six to a corner.
     assert (lattice.patch_count, lattice.edge_count, lattice.fan_count) == (24 * count, 48 * count, 16 * count)
     assert lattice.component_count == 1
-    assert lattice.pinch_lines == 0
+    assert lattice.non_manifold_edges == 0

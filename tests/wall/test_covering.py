@@ -94,12 +94,12 @@ def test_patches_well_inside_need_no_cutting() -> None:
 @pytest.mark.parametrize("inside", [True, False])
 def test_where_the_boundary_is_far_one_point_tells_of_all(inside: bool) -> None:
     complex = build_complex((2, 2, 2))
-    asked: list[int] = []
+    requested: list[int] = []
 
-    def holds(points: Floats) -> NDArray[np.bool_]:
-        asked.append(len(points))
+    def contains(points: Floats) -> NDArray[np.bool_]:
+        requested.append(len(points))
         return np.full(len(points), inside)
 
-    sides = patch_sides(complex, STRAIGHT, L, REACH, lambda points: np.full(len(points), 1e3), holds)
+    sides = patch_sides(complex, STRAIGHT, L, REACH, lambda points: np.full(len(points), 1e3), contains)
     assert np.all(sides == (INSIDE if inside else OUTSIDE))
-    assert asked == [complex.component_count]
+    assert requested == [complex.component_count]

@@ -1,4 +1,4 @@
-"""The exact wall of a lattice that varies: its volume, area and mean thickness, and the block's volume."""
+"""The exact wall of a graded lattice: its volume, area and mean thickness, and the block's volume."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyroid_cad.errors import SoundnessError
+from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.space import SpaceMap
@@ -24,8 +24,8 @@ from gyroid_cad.wall.exact import (
     block_volume,
     differentiation_matrix,
     exact_measures,
-    laid_patches,
-    sampled_place,
+    offset_patches,
+    sampled_point,
 )
 from gyroid_cad.wall.grading import Grading
 
@@ -185,7 +185,7 @@ def test_a_scale_that_varies_scales_the_blocks_volume_by_its_own_determinant() -
 
 
 def test_a_block_that_folds_has_no_volume() -> None:
-    with pytest.raises(SoundnessError, match="inside out"):
+    with pytest.raises(SelfIntersectionError, match="inside out"):
         block_volume((1, 1, 1), Grading(L, 0.5, map=Bend(300).over(SIZE)))
 
 
@@ -201,19 +201,19 @@ def test_polynomials_are_differentiated_exactly(count: int, coefficients: Floats
 @pytest.mark.parametrize("patches", [None, np.array([70, 3, 3, 55])])
 def test_patches_are_laid_in_order_whichever_are_asked_for(patches: NDArray[np.int64] | None) -> None:
     complex, grading, samples = build_complex((3, 1, 1)), Grading(L, field("1 + 0.1*x")), np.array([-1, 0.2, 1])
-    parts = list(laid_patches(complex, grading, samples, patches))
+    parts = list(offset_patches(complex, grading, samples, patches))
     numbers = np.arange(complex.patch_count) if patches is None else patches
     covered = np.concatenate([np.arange(len(numbers))[some] for some, _ in parts])
     np.testing.assert_array_equal(covered, np.arange(len(numbers)))
     points = np.concatenate([part.points for _, part in parts]).reshape(len(numbers), -1, 3)
     for row, patch in zip(points, numbers.tolist(), strict=True):
-        places = [sampled_place(complex, L, samples, patch, index) for index in range(9)]
+        places = [sampled_point(complex, L, samples, patch, index) for index in range(9)]
         np.testing.assert_allclose(row, places, rtol=0, atol=1e-13 * L)
 
 
 def corners(complex: CellComplex, grading: Grading) -> tuple[Floats, Floats]:
     """Points and normals at the patches' corners, in their order round each; shape (patches, 4, 3)."""
-    parts = [part for _, part in laid_patches(complex, grading, np.array([-1.0, 1]))]
+    parts = [part for _, part in offset_patches(complex, grading, np.array([-1.0, 1]))]
     points, normals = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "normals"))
     return points.reshape(-1, 4, 3)[:, [0, 2, 3, 1]], normals.reshape(-1, 4, 3)[:, [0, 2, 3, 1]]
 

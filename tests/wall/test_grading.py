@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyroid_cad.errors import ParameterError, SoundnessError
+from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.space import SpaceMap
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.exact import block_volume, differentiation_matrix, exact_measures, laid_patches
+from gyroid_cad.wall.exact import block_volume, differentiation_matrix, exact_measures, offset_patches
 from gyroid_cad.wall.grading import THINNEST_WALL, Grading
 
 TUBE = USUAL.tube
@@ -47,9 +47,9 @@ def affine(matrix: Any, shift: Any = (0, 0, 0), known: bool = True) -> SpaceMap:
     return SpaceMap(lambda x, y, z: turn @ np.stack([x, y, z]) + np.array(shift)[:, np.newaxis], jacobian)
 
 
-def laid(grading: Grading, samples: Floats = NODES, complex: CellComplex = ONE_CELL) -> tuple[Floats, Floats, Floats]:
+def fitted(grading: Grading, samples: Floats = NODES, complex: CellComplex = ONE_CELL) -> tuple[Floats, Floats, Floats]:
     """Points, normals (patches, m, m, 3) and thickness (patches, m, m) of the exact wall."""
-    parts = [part for _, part in laid_patches(complex, grading, samples)]
+    parts = [part for _, part in offset_patches(complex, grading, samples)]
     shape = (-1, len(samples), len(samples))
     points, normals = (np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "normals"))
     thickness = np.concatenate([p.thickness for p in parts])
@@ -79,12 +79,12 @@ VARIED = {
     "constant scale": Grading(L, 0.5, scale_field=1.7),
     "scale and map": Grading(L, 0.5, scale_field=field("1 + 0.03*x - 0.02*z"), map=Twist(40).over(SIZE)),
 }
-FLAT_POINTS, FLAT_NORMALS, _ = laid(VARIED["flat"])
+FLAT_POINTS, FLAT_NORMALS, _ = fitted(VARIED["flat"])
 
 
 @pytest.mark.parametrize("name", VARIED)
 def test_normals_are_those_of_the_surface_that_was_carried(name: str) -> None:
-    points, normals, _ = laid(VARIED[name])
+    points, normals, _ = fitted(VARIED[name])
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1, rtol=1e-14)
     # What the derivatives of the polynomial through the points err by in flat space, several times.
     np.testing.assert_allclose(normals, differentiated_normals(points), rtol=0, atol=2e-6)
@@ -104,7 +104,7 @@ def test_a_rigid_motion_moves_the_wall_and_leaves_its_thickness(angles: Any, shi
     turn = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     for wall in ({"thickness": field("0.5 + 0.05*x")}, {"density": field("0.2 + 0.01*y")}):
         still, moved = Grading(L, **wall), Grading(L, **wall, map=affine(turn, shift, known))
-        (points, normals, thickness), after = laid(still, NODES[::6]), laid(moved, NODES[::6])
+        (points, normals, thickness), after = fitted(still, NODES[::6]), fitted(moved, NODES[::6])
         np.testing.assert_allclose(after[0], points @ turn.T + shift, rtol=0, atol=1e-12 * 200)
         np.testing.assert_allclose(after[1], normals @ turn.T, rtol=0, atol=1e-9)
         np.testing.assert_allclose(after[2], thickness, rtol=1e-9)
@@ -122,8 +122,8 @@ def test_a_constant_scale_makes_a_larger_lattice_of_the_same_density(scale: floa
 
 @pytest.mark.parametrize("scale", [0.5, 3])
 def test_a_constant_scale_leaves_the_thickness_as_asked_for(scale: float) -> None:
-    asked = field("0.3 + 0.02*x")
-    points, _, thickness = laid(Grading(L, asked, scale_field=scale))
+    requested = field("0.3 + 0.02*x")
+    points, _, thickness = fitted(Grading(L, requested, scale_field=scale))
     np.testing.assert_allclose(points, scale * FLAT_POINTS, rtol=1e-14)
     np.testing.assert_array_equal(thickness, 0.3 + 0.02 * FLAT_POINTS[..., 0])
     # The tube formula of a lattice that large.
@@ -135,14 +135,14 @@ def test_a_constant_scale_leaves_the_thickness_as_asked_for(scale: float) -> Non
 def test_fields_are_asked_in_the_lattices_own_space(name: str) -> None:
     places: list[Floats] = []
 
-    def asked(x: Floats, y: Floats, z: Floats) -> Floats:
+    def requested(x: Floats, y: Floats, z: Floats) -> Floats:
         places.append(np.stack([x, y, z]))
         return np.full_like(x, 0.5)
 
-    wall: dict[str, Any] = {name: Field(asked, "asked")}
+    wall: dict[str, Any] = {name: Field(requested, "asked")}
     if name == "scale_field":
         wall["thickness"] = 0.5
-    laid(Grading(L, **wall, map=affine(2 * np.eye(3), (1e3, 1e3, 1e3))), NODES[::6])
+    fitted(Grading(L, **wall, map=affine(2 * np.eye(3), (1e3, 1e3, 1e3))), NODES[::6])
     reached = np.concatenate(places, axis=1)
     assert reached.min() > -0.251 * L
     assert reached.max() < 1.251 * L
@@ -156,8 +156,8 @@ def test_the_scale_field_comes_before_the_map() -> None:
         return space.function(factor * x, factor * y, factor * z)
 
     for wall in ({"thickness": field("0.5 + 0.05*x")}, {"density": field("0.2 + 0.01*y")}):
-        stages = laid(Grading(L, **wall, scale_field=scale, map=space))
-        for apart, at_once in zip(stages, laid(Grading(L, **wall, map=SpaceMap(both))), strict=True):
+        stages = fitted(Grading(L, **wall, scale_field=scale, map=space))
+        for apart, at_once in zip(stages, fitted(Grading(L, **wall, map=SpaceMap(both))), strict=True):
             np.testing.assert_allclose(apart, at_once, rtol=0, atol=1e-7)
 
 
@@ -184,8 +184,8 @@ def test_a_thin_wall_takes_up_the_density_asked_for_however_the_map_stretches(sp
 
 
 def test_thickness_of_a_density_is_stretched_with_the_space_across_the_wall() -> None:
-    plain, normals = (laid(Grading(L, density=0.3))[2], FLAT_NORMALS)
-    stretched = laid(Grading(L, density=0.3, map=affine(np.diag([2, 1, 1]))))[2]
+    plain, normals = (fitted(Grading(L, density=0.3))[2], FLAT_NORMALS)
+    stretched = fitted(Grading(L, density=0.3, map=affine(np.diag([2, 1, 1]))))[2]
     # Two parallel planes with normal n, stretched along x by 2.
     across = 1 / np.linalg.norm(normals * [0.5, 1, 1], axis=-1)
     np.testing.assert_allclose(stretched, plain * across, rtol=1e-13)
@@ -223,13 +223,15 @@ VALUES: dict[str, Callable[[float, float, float], float]] = {
 @pytest.mark.parametrize("name", BAD)
 def test_what_cannot_be_built_is_refused_with_the_worst_place(name: str) -> None:
     grading, parameter, accepted = BAD[name]
-    with pytest.raises(SoundnessError, match=rf"^{parameter}.* at \(x, y, z\) = .* expected {accepted} ") as caught:
-        laid(grading)
+    with pytest.raises(
+        SelfIntersectionError, match=rf"^{parameter}.* at \(x, y, z\) = .* expected {accepted} "
+    ) as caught:
+        fitted(grading)
     error = caught.value
     assert (error.parameter, error.accepted) == (parameter, accepted)
     assert isinstance(error, ParameterError)
     assert "\n" not in str(error)
-    assert error.limit == {"below": TUBE.largest_density, "at least": THINNEST_WALL, "above": 0}[accepted]
+    assert error.limit == {"below": TUBE.max_density, "at least": THINNEST_WALL, "above": 0}[accepted]
     assert error.value >= error.limit if accepted == "below" else error.value <= error.limit
     if name in VALUES:
         assert error.value == pytest.approx(VALUES[name](*error.place), rel=1e-5, abs=1e-9)
@@ -239,19 +241,19 @@ def test_what_cannot_be_built_is_refused_with_the_worst_place(name: str) -> None
 
 @pytest.mark.parametrize("name", BAD)
 def test_refusals_can_be_sent_between_processes(name: str) -> None:
-    with pytest.raises(SoundnessError) as caught:
-        laid(BAD[name][0])
+    with pytest.raises(SelfIntersectionError) as caught:
+        fitted(BAD[name][0])
     again = pickle.loads(pickle.dumps(caught.value))
-    assert type(again) is SoundnessError
+    assert type(again) is SelfIntersectionError
     assert str(again) == str(caught.value)
     assert vars(again) == vars(caught.value)
 
 
 def test_the_thinnest_wall_and_just_under_the_largest_density_pass() -> None:
-    np.testing.assert_array_equal(laid(Grading(L, field(f"{THINNEST_WALL!r} + 0*x")))[2], THINNEST_WALL)
-    laid(Grading(L, density=float(np.nextafter(TUBE.largest_density, 0))))
-    with pytest.raises(SoundnessError, match="the density at which the wall meets itself"):
-        laid(Grading(L, density=TUBE.largest_density))
+    np.testing.assert_array_equal(fitted(Grading(L, field(f"{THINNEST_WALL!r} + 0*x")))[2], THINNEST_WALL)
+    fitted(Grading(L, density=float(np.nextafter(TUBE.max_density, 0))))
+    with pytest.raises(SelfIntersectionError, match="the density at which the wall meets itself"):
+        fitted(Grading(L, density=TUBE.max_density))
 
 
 @pytest.mark.parametrize("parameter", ["thickness", "density", "scale_field"])
@@ -261,7 +263,7 @@ def test_a_field_that_gives_no_finite_numbers_is_refused_by_its_name(parameter: 
     if parameter == "scale_field":
         wall["thickness"] = 0.5
     with pytest.raises(ParameterError, match=f"^{parameter} = bad: expected "):
-        laid(Grading(L, **wall))
+        fitted(Grading(L, **wall))
 
 
 def test_only_a_constant_wall_in_flat_space_is_uniform() -> None:

@@ -1,4 +1,4 @@
-"""The wall of a lattice that varies, fitted anew: how close it is, and that neighbours meet."""
+"""The wall of a graded lattice, fitted anew: how close it is, and that neighbours meet."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.space import SpaceMap
 from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, uniform_knots
-from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.surface.fit_settings import MOST_CONTROL_POINTS
+from gyroid_cad.surface.fit import MOST_CONTROL_POINTS, FitSettings, fit_patch
 from gyroid_cad.wall import refit as refit_module
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.exact import laid_patches
+from gyroid_cad.wall.exact import offset_patches
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import SIDES, Wall, build_wall
-from gyroid_cad.wall.refit import WALL_PER_TOLERANCE, Refit, fitted_nets, fitted_wall, likely_control_points, measured
+from gyroid_cad.wall.refit import WALL_PER_TOLERANCE, Refit, fitted_nets, graded_wall, likely_control_points, measured
 
 Floats = NDArray[np.float64]
 Cells = tuple[int, int, int]
@@ -44,7 +43,7 @@ def field(text: str) -> Field:
     return made
 
 
-PAPER = Lattice.paper((1, 1, 1), "0.08 + 0.05*x + 0.02*y", "1 + 0.05*x + 0.08*y")._grading()
+PAPER = Lattice.paper((1, 1, 1), "0.08 + 0.05*x + 0.02*y", "1 + 0.05*x + 0.08*y").grading()
 GRADINGS = {
     "slope": Grading(L, field("0.8 + 0.03*x")),
     "density": Grading(L, density=field("0.2 + 0.01*y"), map=Twist(30).over(SIZE)),
@@ -76,10 +75,10 @@ def dense(wall: Wall, grading: Grading, count: int) -> tuple[float, float]:
     functions = basis(knots, 3, samples)
     faces = np.einsum("ui,psijc,vj->psuvc", functions, wall.nets, functions, optimize=True)
     deviation = error = 0.0
-    for some, laid in laid_patches(wall.complex, grading, samples):
-        normal, shape = laid.normals.reshape(-1, count, count, 3), (-1, count, count)
-        height = np.einsum("psuvc,puvc->psuv", faces[some] - laid.points.reshape(-1, 1, count, count, 3), normal)
-        thickness = laid.thickness.reshape(shape)
+    for some, fitted in offset_patches(wall.complex, grading, samples):
+        normal, shape = fitted.normals.reshape(-1, count, count, 3), (-1, count, count)
+        height = np.einsum("psuvc,puvc->psuv", faces[some] - fitted.points.reshape(-1, 1, count, count, 3), normal)
+        thickness = fitted.thickness.reshape(shape)
         off = height - np.stack([-thickness, thickness], axis=1) / 2
         deviation = max(deviation, float(np.abs(off).max()))
         error = max(error, float(np.abs((height[:, 1] - height[:, 0]) / thickness - 1).max()))
@@ -89,7 +88,7 @@ def dense(wall: Wall, grading: Grading, count: int) -> tuple[float, float]:
 @pytest.mark.parametrize("control_points", [6, 10, 17])
 def test_a_wall_that_does_not_vary_is_that_of_the_staged_fit(control_points: int) -> None:
     grading = Grading(L, 0.8)
-    anew = fitted_wall(CELL, grading, control_points)
+    anew = graded_wall(CELL, grading, control_points)
     staged = build_wall(CELL, fit_patch(FitSettings(control_points)), L, 0.8)
     u, v = np.linspace(-1, 1, 13)[:, np.newaxis], np.linspace(-1, 1, 13)
     close = 2 * measured(anew.nets, CELL, grading).max_deviation
@@ -142,7 +141,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_spans(name: str) -> None:
 @pytest.mark.parametrize("control_points", [9, 14])
 def test_nowhere_is_the_fit_much_worse_than_measured(name: str, control_points: int) -> None:
     grading, reported = GRADINGS[name], fit(name, control_points)
-    wall = fitted_wall(CELL, grading, control_points)
+    wall = graded_wall(CELL, grading, control_points)
     deviation, error = dense(wall, grading, 37)
     assert deviation == pytest.approx(reported.max_deviation, rel=0.15)
     assert error == pytest.approx(reported.max_wall_error, rel=0.15)
@@ -163,7 +162,7 @@ def gaps(wall: Wall) -> Floats:
 
 @pytest.mark.parametrize("name", GRADINGS)
 def test_neighbours_share_the_edges_of_both_faces(name: str) -> None:
-    wall = fitted_wall(CELL, GRADINGS[name], 10)
+    wall = graded_wall(CELL, GRADINGS[name], 10)
     assert gaps(wall).max() < 2e-11 * L
 
 
@@ -171,7 +170,7 @@ def test_a_closed_ring_shares_its_edges_across_the_seam_too() -> None:
     complex, grading = closed_ring()
     seam = np.ptp(complex.patch_cell[complex.edge_patches[~complex.free]][..., 0], axis=1) == 2
     assert 2 * seam.sum() == build_complex((3, 1, 1)).free.sum() - complex.free.sum()
-    apart = gaps(fitted_wall(complex, grading, 10))
+    apart = gaps(graded_wall(complex, grading, 10))
     assert apart[seam].max() < 2e-11 * L
     assert apart.max() < 2e-11 * L
 
@@ -181,13 +180,13 @@ def test_a_field_that_differs_at_the_ends_a_map_joins_is_refused(thickness: str)
     ring = Cylinder(7, 360).over((3 * L, L, L))
     complex = build_complex((3, 1, 1), closed=ring.closed)
     with pytest.raises(FitError, match=r"edges of neighbouring patches are .* the same at both ends that a map joins"):
-        fitted_wall(complex, Grading(L, field(thickness), map=ring), 8)
+        graded_wall(complex, Grading(L, field(thickness), map=ring), 8)
 
 
 def test_a_map_that_only_says_that_it_closes_is_refused() -> None:
     space = SpaceMap(lambda x, y, z: (x, y, z), closed=(True, False, False))
     with pytest.raises(FitError, match="edges of neighbouring patches are 10 mm apart"):
-        fitted_wall(build_complex((1, 1, 1), closed=space.closed), Grading(L, 0.8, map=space), 8)
+        graded_wall(build_complex((1, 1, 1), closed=space.closed), Grading(L, 0.8, map=space), 8)
 
 
 def ray_lengths(face: NurbsSurface, origin: Floats, along: Floats, start: tuple[Floats, Floats], s: Floats) -> Floats:
@@ -208,10 +207,10 @@ def test_rays_along_the_exact_normal_meet_the_faces_half_a_thickness_away(name: 
     wall = wall_within(CELL, grading, TOLERANCE)
     samples = np.sort(np.random.default_rng(11).uniform(-0.97, 0.97, 9))
     u, v = (parameter.ravel() for parameter in np.meshgrid(samples, samples, indexing="ij"))
-    ((_, laid),) = laid_patches(CELL, grading, samples)
+    ((_, fitted),) = offset_patches(CELL, grading, samples)
     for patch in range(CELL.patch_count):
         rays = slice(patch * len(u), (patch + 1) * len(u))
-        middle, normal, half = laid.points[rays], laid.normals[rays], laid.thickness[rays] / 2
+        middle, normal, half = fitted.points[rays], fitted.normals[rays], fitted.thickness[rays] / 2
         below, above = (
             ray_lengths(wall.face(patch, side), middle, normal, (u, v), (2 * side - 1) * half) for side in SIDES
         )
@@ -224,7 +223,7 @@ def wall_within(complex: CellComplex, grading: Grading, tolerance: float, least:
     wanted, n = likely_control_points(complex, grading, least, tolerance), 0
     while n != wanted:
         n = wanted
-        wall = fitted_wall(complex, grading, n)
+        wall = graded_wall(complex, grading, n)
         wanted = measured(wall.nets, complex, grading).control_points_for(tolerance, grading.cell_size)
     return wall
 
@@ -233,7 +232,7 @@ def test_control_points_rise_for_all_patches_alike_until_the_tolerance_is_met() 
     counts = []
     for tolerance in (1e-3, 1e-5, 1e-6):
         lattice = Lattice((1, 1, 1), L, 0.8, map="cylinder:radius=8", tolerance=tolerance, fit=FitSettings(5))
-        wall, grading = lattice.wall(), lattice._grading()
+        wall, grading = lattice.wall(), lattice.grading()
         n = len(wall.weights)
         assert wall.nets.shape == (24, 2, n, n, 3)
         made = measured(wall.nets, CELL, grading)

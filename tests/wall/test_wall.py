@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.nurbs.surface import NurbsSurface, basis, gauss_points
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
-from gyroid_cad.surface.fit import FitSettings, fit_patch, largest_offset
-from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
+from gyroid_cad.surface.fit import FitSettings, fit_patch, max_offset
+from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import SIDES, Wall, build_wall
 
@@ -168,11 +167,11 @@ def test_faces_fold_over_just_past_the_largest_offset_of_the_fit_and_not_before(
         faces = [patch.offset(side * offset).derivatives(u, v) for side in (-1, 1)]
         return min(float(np.min(np.sum(np.cross(d[1, 0], d[0, 1]) * patch.normals.evaluate(u, v), -1))) for d in faces)
 
-    assert least_area(0.999 * largest_offset(patch)) > 0 > least_area(1.001 * largest_offset(patch))
+    assert least_area(0.999 * max_offset(patch)) > 0 > least_area(1.001 * max_offset(patch))
 
 
 def test_a_wall_past_the_fits_own_limit_is_refused_with_the_limit() -> None:
-    limit = 2 * largest_offset(fit_patch()) * CELL_SIZE / 2
+    limit = 2 * max_offset(fit_patch()) * CELL_SIZE / 2
     wall_of((1, 1, 1), 0.9999 * limit / CELL_SIZE)
     with pytest.raises(ParameterError, match=f"thickness = .*below {limit:.6g} mm"):
         wall_of((1, 1, 1), limit / CELL_SIZE)

@@ -13,7 +13,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.progress import Progress, tell
+from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
@@ -69,12 +69,12 @@ def write_abaqus(
         # CalculiX reads 20 characters of a number.
         rows = mesh.points[first : first + _ROWS_AT_ONCE].tolist()
         file.writelines(f"{number},{x:.12e},{y:.12e},{z:.12e}\n" for number, (x, y, z) in enumerate(rows, first + 1))
-        tell(progress, "mesh", first, total)
+        report_progress(progress, "mesh", first, total)
     file.write(f"*ELEMENT, TYPE={name}, ELSET=WALL\n")
     for first in range(0, len(mesh.cells), _ROWS_AT_ONCE):
         rows = (mesh.cells[first : first + _ROWS_AT_ONCE] + 1).tolist()
         file.writelines(_lines([number, *row]) for number, row in enumerate(rows, first + 1))
-        tell(progress, "mesh", len(mesh.points) + first, total)
+        report_progress(progress, "mesh", len(mesh.points) + first, total)
     for set_name, elements in mesh.element_sets().items():
         _write_set(file, "ELSET", set_name, elements)
     for set_name, nodes in _node_sets(mesh, pairs):
@@ -86,7 +86,7 @@ def write_abaqus(
             _write_set(file, "ELSET", set_name, elements)
         file.write(f"*SURFACE, NAME={surface_name}, TYPE=ELEMENT\n")
         file.writelines(f"{set_name}, {set_name.rpartition('_')[2]}\n" for set_name in parts)
-    tell(progress, "mesh", total, total)
+    report_progress(progress, "mesh", total, total)
 
 
 def _node_sets(mesh: Mesh, pairs: PeriodicPairs | None) -> Iterator[tuple[str, Integers]]:

@@ -1,4 +1,4 @@
-"""What an element's corners say of its shape, as Verdict defines it: scaled Jacobian, ratios, skew, warpage, angles.
+"""Shape measures of an element from its corners, as Verdict defines them: scaled Jacobian, ratios, skew, angles.
 
 Verdict is the library behind VTK's and CUBIT's quality filters (Knupp et al., The Verdict Geometric Quality Library,
 SAND2007-1751; VTK's copy in ThirdParty/verdict). It differs here in four things, each held by a test:
@@ -52,7 +52,7 @@ def quadrilateral_corner_measures(corners: Floats) -> Measures:
     - edge_ratio: longest over shortest edge
     - skew: |cos(X_1, X_2)|
     - warpage: 1 - min(cos(N_0, N_2), cos(N_1, N_3))^3
-    - smallest_angle, largest_angle: between neighbouring edges, in degrees; the largest is taken from 360 where the
+    - min_angle, max_angle: between neighbouring edges, in degrees; the largest is taken from 360 where the
       quadrilateral is not convex
 
     Parameters
@@ -79,8 +79,8 @@ def quadrilateral_corner_measures(corners: Floats) -> Measures:
         "edge_ratio": _quotient(lengths.max(axis=0), lengths.min(axis=0), NO_NUMBER),
         "skew": np.abs(np.sum(_unit(axes[:, 0]) * _unit(axes[:, 1]), axis=0)),
         "warpage": _warpage(normals),
-        "smallest_angle": smallest,
-        "largest_angle": largest,
+        "min_angle": smallest,
+        "max_angle": largest,
     }
 
 
@@ -95,7 +95,7 @@ def hexahedron_corner_measures(corners: Floats) -> Measures:
       Verdict's quadrilateral aspect ratio there is no counterpart
     - edge_ratio: longest over shortest edge, which Abaqus/CAE calls the aspect ratio
     - skew: largest |cos(X_i, X_j)|
-    - warpage, smallest_angle, largest_angle: the worst of the faces'
+    - warpage, min_angle, max_angle: the worst of the faces'
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def hexahedron_corner_measures(corners: Floats) -> Measures:
         "edge_ratio": _quotient(lengths.max(axis=0), lengths.min(axis=0), NO_NUMBER),
         "skew": np.where(axis_lengths.min(axis=0) <= _NOTHING, NO_NUMBER, turned),
         "warpage": np.max(warpage, axis=0),
-        "smallest_angle": np.min(smallest, axis=0),
-        "largest_angle": np.max(largest, axis=0),
+        "min_angle": np.min(smallest, axis=0),
+        "max_angle": np.max(largest, axis=0),
     }
 
 

@@ -65,7 +65,7 @@ class ElementType:
 
     @property
     def sparse(self) -> bool:
-        """Whether some places halfway along its sides have no node."""
+        """True where some places halfway along its sides have no node."""
         return len(self.nodes) in (8, 20) and self.order > 1
 
 

@@ -106,7 +106,7 @@ def _write_by_meshio(mesh: Any, path: Path, file_format: str, **options: Any) ->
 
 
 def _ids(mesh: Mesh) -> dict[str, Integers]:
-    """Of every element: its patch, bounding cell, cubic cell and layer, from 1; shape (elements,) each."""
+    """Numbers of every element's patch, bounding cell, cubic cell and layer, from 1; shape (elements,) each."""
     complex, patch = mesh.complex, mesh.element_patch
     cell_of_patch = np.unique(complex.patch_cell, axis=0, return_inverse=True)[1].ravel()
     return {

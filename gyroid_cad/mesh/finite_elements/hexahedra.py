@@ -16,7 +16,7 @@ from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.memory import require_room
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, ElementType, element_type
-from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_places, place_count
+from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.offset import Wall
@@ -88,12 +88,12 @@ class Mesh:
 
     @property
     def element_patch(self) -> Integers:
-        """Which patch each element belongs to; shape (elements,)."""
+        """Patch of each element; shape (elements,)."""
         return np.arange(len(self.cells)) // (max(self.layers, 1) * self.subdivisions**2)
 
     @property
     def element_layer(self) -> Integers:
-        """Which layer each element belongs to, from face B on; shape (elements,)."""
+        """Layer of each element, from face B on; shape (elements,)."""
         return np.arange(len(self.cells)) // self.subdivisions**2 % max(self.layers, 1)
 
     @property
@@ -202,7 +202,7 @@ def _meshed(wall: Wall, subdivisions: int, layers: int, element: ElementType) ->
     steps = element.order * subdivisions
     across = np.linspace(0, 1, element.order * layers + 1) if layers else np.array([0.5])
     points = _nodes(wall, steps, across)
-    cells = _cells(patch_places(wall.complex, steps), len(across), element)
+    cells = _cells(patch_nodes(wall.complex, steps), len(across), element)
     kept = None
     if element.sparse:
         kept, numbers = np.unique(cells, return_inverse=True)
@@ -239,7 +239,7 @@ def _nodes(wall: Wall, steps: int, levels: Floats) -> Floats:
         # Axis by axis: loops of three would be too short.
         for axis in range(3):
             np.add(within[..., axis], shifts[..., axis], out=inside[some][..., axis])
-        points[patch_places(wall.complex, steps, some).reshape(len(nets), -1)[:, border]] = around + shifts
+        points[patch_nodes(wall.complex, steps, some).reshape(len(nets), -1)[:, border]] = around + shifts
     return points.reshape(-1, 3)
 
 
@@ -252,7 +252,7 @@ def _split_grids(wall: Wall, nets: Integers | slice, steps: int, levels: Floats)
 
 
 def _on_border(steps: int) -> NDArray[np.bool_]:
-    """Which places of a patch's grid, in one row, lie on its border."""
+    """Mask of the places of a patch's grid, in one row, that lie on its border."""
     border = np.ones((steps + 1, steps + 1), dtype=bool)
     border[1:-1, 1:-1] = False
     return border.ravel()

@@ -69,7 +69,7 @@ def periodic_pairs(mesh: Mesh, cell_size: float) -> PeriodicPairs:
     """
     complex = mesh.complex
     inner = mesh.element.order * mesh.subdivisions - 1
-    first, second, blocks = _paired_places(complex, inner)
+    first, second, blocks = _paired_nodes(complex, inner)
     place, level = mesh.columns
     numbers = np.full((int(place.max()) + 1, mesh.levels), -1)
     numbers[place, level] = np.arange(len(mesh.points))
@@ -84,8 +84,8 @@ def periodic_pairs(mesh: Mesh, cell_size: float) -> PeriodicPairs:
     return PeriodicPairs(pair[good, 0], pair[good, 1], blocks[good], period)
 
 
-def _paired_places(complex: CellComplex, inner: int) -> tuple[Integers, Integers, Integers]:
-    """Pairs of places (see :mod:`gyroid_cad.mesh.nodes`) on free edges and at their ends, and the blocks between."""
+def _paired_nodes(complex: CellComplex, inner: int) -> tuple[Integers, Integers, Integers]:
+    """Pairs of nodes of :mod:`gyroid_cad.mesh.nodes` on boundary edges and at their ends, and the blocks between."""
     block = CELL_QUARTERS * np.array(complex.cells)
     free = np.flatnonzero(complex.free)
     ends = complex.corner_quarters[complex.fan_corner[complex.edge_fans[free]]]
@@ -117,7 +117,7 @@ def _paired_places(complex: CellComplex, inner: int) -> tuple[Integers, Integers
 
 
 def _alike(keys: Integers) -> tuple[Integers, Integers]:
-    """Of rows that are equal, the first one, over and over, and each of the others."""
+    """Pairs of equal rows: the first one, over and over, and each of the others."""
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     leader = first[group.ravel()]
     others = np.flatnonzero(leader != np.arange(len(keys)))

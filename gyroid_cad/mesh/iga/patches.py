@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_places, place_count
+from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
 from gyroid_cad.nurbs.volume import NurbsVolume
-from gyroid_cad.wall.complex import CellComplex, build_complex, connected
+from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["BOUNDARY_PARTS", "DEGREES_ACROSS", "FACE_CORNERS", "VolumePatches", "periodic_points", "wall_volumes"]
@@ -45,12 +46,12 @@ _PATCHES_AT_ONCE = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VolumePatches:
-    """All patches of a wall and how they hang together.
+    """All patches of a wall and how they are connected.
 
     Attributes
     ----------
     control_points : ndarray, shape (points, 3)
-        In mm. Those of side 0 come first, in the order of :func:`~gyroid_cad.mesh.nodes.patch_places`, those of
+        In mm. Those of side 0 come first, in the order of :func:`~gyroid_cad.mesh.nodes.patch_nodes`, those of
         side 1 last.
     patch_points : ndarray of int, shape (patches, n, n, k)
         Numbers of the control points of every patch along u, v and w.
@@ -103,7 +104,7 @@ class VolumePatches:
 
     @property
     def rational(self) -> bool:
-        """Whether the weights differ, so that the patches are not polynomial."""
+        """True where the weights differ, so that the patches are not polynomial."""
         return bool(np.ptp(self.weights) > 0)
 
     def patch(self, index: int) -> NurbsVolume:
@@ -180,7 +181,7 @@ def periodic_points(wall: Wall, volumes: VolumePatches) -> Integers:
     steps = len(wall.weights) - 1
     levels = np.arange(volumes.weights.shape[2]) * place_count(endless, steps)
     numbers = np.empty(len(volumes.control_points), dtype=np.int64)
-    numbers[volumes.patch_points] = patch_places(endless, steps)[..., np.newaxis] + levels
+    numbers[volumes.patch_points] = patch_nodes(endless, steps)[..., np.newaxis] + levels
     return numbers
 
 
@@ -188,7 +189,7 @@ def _control_points(wall: Wall, levels: int) -> tuple[Floats, Integers]:
     """Distinct control points and, for each patch, their numbers."""
     steps = len(wall.weights) - 1
     count = place_count(wall.complex, steps)
-    places = patch_places(wall.complex, steps)
+    places = patch_nodes(wall.complex, steps)
     points = np.empty((levels, count, 3))
     across = np.linspace(0.0, 1.0, levels).reshape(-1, 1, 1, 1, 1)
     for first in range(0, len(places), _PATCHES_AT_ONCE):

@@ -47,7 +47,7 @@ class FaceGroup:
 
     @property
     def triangles(self) -> Integers:
-        """Of both faces, oriented outwards, in the corners of face 0 and then of face 1; shape (triangles, 3)."""
+        """Triangles of both faces, oriented outwards, in the corners of face 0, then 1; shape (triangles, 3)."""
         below, above = self.template.triangles[:, ::-1], self.template.triangles + len(self.template.places)
         return np.concatenate([below, above])
 
@@ -68,7 +68,7 @@ def face_groups(triangulation: Triangulation) -> Iterator[FaceGroup]:
 
 
 def side_groups(triangulation: Triangulation) -> Iterator[tuple[Template, Integers]]:
-    """All free edges by their steps, with the template of their side walls."""
+    """All boundary edges by their steps, with the template of their side walls."""
     free = np.flatnonzero(triangulation.wall.complex.free)
     steps = triangulation.edge_steps[free]
     for along in np.unique(steps).tolist():
@@ -76,7 +76,7 @@ def side_groups(triangulation: Triangulation) -> Iterator[tuple[Template, Intege
 
 
 class Corners:
-    """Where the corners of a triangulation are, in mm, in single precision: x, y, z and a nought.
+    """Coordinates of a triangulation's corners, in mm, in single precision: x, y, z and a zero.
 
     For what is gathered of them: sixteen bytes at a time go four times as quick as twelve.
 
@@ -98,7 +98,7 @@ class Corners:
         self._matrices: dict[int, Floats] = {}
 
     def of_faces(self, group: FaceGroup) -> Callable[[Integers], Singles]:
-        """From some patches of a group to the corners of both their faces, shape (patches, 2, places, 4)."""
+        """Function from some patches of a group to the corners of both their faces, shape (patches, 2, places, 4)."""
         wall, complex = self._wall, self._wall.complex
         first = sum(group.edge_steps)
         if group.steps not in self._matrices:
@@ -239,7 +239,7 @@ class _Numbers:
         self._on_edges = complex.fan_count + _starts(between)
         self._inside = complex.fan_count + int(between.sum()) + _starts(inside)
         self._face = complex.fan_count + int(between.sum() + inside.sum())
-        # Through the wall: at every fan on the border, then along every free edge.
+        # Through the wall: at every fan on the border, then along every boundary edge.
         within = self._across - 1
         border = complex.border_fans
         self._at_fans = 2 * self._face + _starts(border * within)
@@ -280,7 +280,7 @@ class _Numbers:
 
 
 def _four_wide(places: Floats) -> Singles:
-    """In single precision, with a nought behind."""
+    """Coordinates in single precision, with a zero behind."""
     wide = np.zeros((*places.shape[:-1], 4), dtype=np.float32)
     wide[..., :3] = places
     return wide

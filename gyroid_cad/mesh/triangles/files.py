@@ -72,7 +72,7 @@ def _stl_corners(path: Path) -> Floats:
 
 
 def _merged(corners: Floats) -> tuple[Floats, Integers]:
-    # Minus nought is nought.
+    # Minus zero is zero.
     flat = np.ascontiguousarray(corners.reshape(-1, 3) + 0.0)
     keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
     _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)

@@ -1,83 +1,241 @@
-"""What triangles amount to: their size, whether they close, and what they enclose."""
+"""Areas, volumes, pieces, voids and wall thickness of meshes of triangles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.wall.complex import connected
+from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.common.graph import connected
+from gyroid_cad.errors import GyroidError
 
-__all__ = ["TriangleMeasures", "triangle_measures"]
+__all__ = ["TriangleMeasures", "measured_walls", "triangle_measures"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
+# Solid angle of a whole sphere, by which winding numbers are counted.
+_SPHERE = 4 * np.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TriangleMeasures:
-    """What triangles amount to.
+    """Measures of a mesh of triangles, shell by shell.
+
+    A shell is what is connected by edges. Oriented outwards, one that bounds solid encloses a positive volume, and one
+    that bounds a void within it a negative one.
 
     Attributes
     ----------
     triangles, vertices : int
-    closed : bool
-        Whether every edge is used by as many triangles one way as the other: then there is an inside.
-    manifold : bool
-        Whether it is used exactly once each way.
     open_edges : int
-        Edges used more often one way than the other.
-    pieces : int
-        That hang together by vertices.
-    low, high : tuple of float
+        Used more often one way than the other: at these the surface is not closed, or turned inside out.
+    manifold : bool
+        Whether every edge is used exactly once each way.
+    low, high : ndarray, shape (3,)
         Corners of the bounding box, in mm.
-    volume, area : float
-        In mm3 and mm2; the volume is of no meaning where the triangles are not closed.
+    area : float
+        In mm2.
+    volumes : ndarray, shape (shells,)
+        Signed, in mm3; the largest in size first. Of no meaning where a shell is not closed.
+    inwards, inside : ndarray of bool, shape (shells,)
+        Which shells are closed and turned inwards, and whether another goes round these.
     """
 
     triangles: int
     vertices: int
-    closed: bool
-    manifold: bool
     open_edges: int
-    pieces: int
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    volume: float
+    manifold: bool
+    low: Floats
+    high: Floats
     area: float
+    volumes: Floats
+    inwards: Booleans
+    inside: Booleans
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def closed(self) -> bool:
+        """Tell whether every edge is used as often one way as the other: then there is an inside."""
+        return self.open_edges == 0
+
+    @property
+    def volume(self) -> float:
+        """Of all shells together, in mm3."""
+        return float(self.volumes.sum())
+
+    @property
+    def pieces(self) -> int:
+        """Bodies that no edge joins: all shells but those turned inwards."""
+        return int(np.sum(~self.inwards))
+
+    @property
+    def trapped_voids(self) -> int:
+        """Shells turned inwards, inside another."""
+        return int(np.sum(self.inwards & self.inside))
+
+    @property
+    def inside_out(self) -> int:
+        """Shells turned inwards that no other goes round."""
+        return int(np.sum(self.inwards & ~self.inside))
 
 
-def triangle_measures(vertices: Floats, triangles: Integers) -> TriangleMeasures:
-    """What triangles are: their size, whether they close, and what they enclose.
+def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> TriangleMeasures:
+    """Measure triangles: their size, whether they close, and what they enclose.
 
     Parameters
     ----------
-    vertices : ndarray, shape (n, 3)
-        In mm.
-    triangles : ndarray of int, shape (m, 3)
+    vertices : ndarray, shape (vertices, 3)
+        In mm; no two alike, for triangles are connected by their vertices' numbers.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+
+    Returns
+    -------
+    TriangleMeasures
     """
+    points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    keys = edges.min(axis=1) * len(points) + edges.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    same, owner = keys[order][1:] == keys[order][:-1], order // 3
+    labels = connected(len(facets), owner[:-1][same], owner[1:][same])
+    first = np.flatnonzero(np.concatenate([[True], ~same]))
+    one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))
+    opened = 2 * one_way != uses
     # Near the triangles, so that volumes far from the origin lose no digits.
-    middle = vertices.mean(axis=0)
-    a, b, c = (vertices[triangles[:, k]] - middle for k in range(3))
-    twice = np.cross(b - a, c - a)
-    ends = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    forward = ends[:, 0] < ends[:, 1]
-    edges, which = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    one_way = np.bincount(which.ravel()[forward], minlength=len(edges))
-    other_way = np.bincount(which.ravel()[~forward], minlength=len(edges))
-    used = np.unique(triangles)
-    label = connected(len(vertices), edges[:, 0], edges[:, 1])[used]
-    low, high = vertices[used].min(axis=0), vertices[used].max(axis=0)
+    a, b, c = np.moveaxis(points[facets] - points.mean(axis=0), 1, 0)
+    volumes = np.bincount(labels, dot(a, np.cross(b, c)) / 6).astype(np.float64)
+    closed = np.bincount(labels[owner[first[opened]]], minlength=len(volumes)) == 0
+    ranked = np.argsort(-np.abs(volumes), kind="stable")
+    inwards = (closed & (volumes < 0))[ranked]
+    # There may be thousands of loose pieces, and each question takes all triangles: only voids are asked.
+    inside = np.zeros(len(ranked), dtype=np.bool_)
+    for place in np.flatnonzero(inwards).tolist():
+        inside[place] = _inside_another(points, facets, labels, int(ranked[place]))
+    used = np.unique(facets)
     return TriangleMeasures(
-        triangles=len(triangles),
+        triangles=len(facets),
         vertices=len(used),
-        closed=bool(np.all(one_way == other_way)),
-        manifold=bool(np.all((one_way == 1) & (other_way == 1))),
-        open_edges=int(np.sum(one_way != other_way)),
-        pieces=len(np.unique(label)),
-        low=tuple(low.tolist()),
-        high=tuple(high.tolist()),
-        volume=float(np.sum(a * twice) / 6),
-        area=float(np.sum(np.linalg.norm(twice, axis=1)) / 2),
+        open_edges=int(np.sum(opened)),
+        manifold=bool(np.all((uses == 2) & (one_way == 1))),
+        low=points[used].min(axis=0),
+        high=points[used].max(axis=0),
+        area=float(np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)) / 2),
+        volumes=volumes[ranked],
+        inwards=inwards,
+        inside=inside,
     )
+
+
+def _inside_another(points: Floats, triangles: Integers, labels: Integers, shell: int) -> bool:
+    """Tell whether another shell goes round one: by the winding number of the others about a point of it.
+
+    Solid angles of triangles as of van Oosterom and Strackee (IEEE Trans. Biomed. Eng. 30, 1983).
+    """
+    others = labels != shell
+    point = points[triangles[np.flatnonzero(~others)[0], 0]]
+    a, b, c = np.moveaxis(points[triangles[others]] - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+    flat = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
+    angles = 2 * np.arctan2(dot(a, np.cross(b, c)), flat)
+    # Shell by shell: what one encloses another may exclude.
+    winding = np.bincount(labels[others], angles, minlength=int(labels.max()) + 1) / _SPHERE
+    return bool(np.any(np.rint(winding) != 0))
+
+
+# A ray starts so far inside, as a part of the solid's size: beyond rounding, and far below any wall.
+_STARTS_INSIDE = 1e-6
+# How near a line must pass a triangle to meet it, as a part of the solid's size: with none VTK misses some.
+_MEETS = 1e-9
+# A wall has two sides that face away from each other, within 45 degrees; tips and edges, which run out to nothing, have
+# not.
+_FACING_AWAY = -np.sqrt(0.5)
+
+
+def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer], places: int) -> Floats:
+    """Distances through the solid, along the inward normals of triangles, to where it ends again.
+
+    Every place stands for the same area: triangles are drawn by their areas, by a generator that always starts alike,
+    and places by chance in them. Rays are followed by VTK's static cell locator.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Closed and counterclockwise seen from outside.
+    places : int
+        How many.
+
+    Returns
+    -------
+    ndarray
+        In mm, sorted; one for each place whose ray meets the surface again on a side that faces away, within 45
+        degrees.
+
+    Raises
+    ------
+    GyroidError
+        If VTK is not installed.
+    """
+    points, facets = np.array(vertices, dtype=float, order="C"), np.array(triangles, dtype=np.int64, order="C")
+    core = _vtk("vtkCommonCore")
+    locator = _locator(points, facets)
+    starts, inward, normals = _places(points, facets, places)
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    starts = starts + _STARTS_INSIDE * size * inward
+    found = []
+    for start, direction in zip(starts, inward, strict=True):
+        part, place, local, sub, cell = core.mutable(0.0), [0.0] * 3, [0.0] * 3, core.mutable(0), core.mutable(-1)
+        met = locator.IntersectWithLine(start, start + size * direction, _MEETS * size, part, place, local, sub, cell)
+        if met and -direction @ normals[int(cell)] < _FACING_AWAY:
+            found.append(float(part) * size)
+    return np.sort(np.array(found)) + _STARTS_INSIDE * size
+
+
+def _locator(points: Floats, triangles: NDArray[np.int64]) -> Any:
+    """Locator of the triangles that a line meets."""
+    core, model, support = _vtk("vtkCommonCore"), _vtk("vtkCommonDataModel"), _vtk("util.numpy_support")
+    data, nodes, cells = model.vtkPolyData(), core.vtkPoints(), model.vtkCellArray()
+    ends = np.arange(0, triangles.size + 1, 3)
+    nodes.SetData(support.numpy_to_vtk(points, deep=True))
+    cells.SetData(*(support.numpy_to_vtkIdTypeArray(part, deep=True) for part in (ends, triangles.ravel())))
+    data.SetPoints(nodes)
+    data.SetPolys(cells)
+    locator = model.vtkStaticCellLocator()
+    locator.SetDataSet(data)
+    locator.BuildLocator()
+    return locator
+
+
+def _vtk(module: str) -> Any:
+    """A module of VTK, which comes with the kernel's usual wheel."""
+    try:
+        return import_module(f"vtkmodules.{module}")
+    except ImportError as problem:
+        raise GyroidError(f"measuring the walls of triangles needs VTK (pip install vtk): {problem}") from None
+
+
+def _places(points: Floats, triangles: NDArray[np.int64], count: int) -> tuple[Floats, Floats, Floats]:
+    """Places spread evenly over the surface, the unit normals into the solid there, and those out of all triangles."""
+    generator = np.random.default_rng(0)
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    outward = np.cross(b - a, c - a)
+    areas = np.linalg.norm(outward, axis=1)
+    chosen = generator.choice(len(triangles), count, p=areas / areas.sum())
+    first, second = generator.random((2, count, 1))
+    turned = first + second > 1
+    first, second = np.where(turned, 1 - first, first), np.where(turned, 1 - second, second)
+    places = a[chosen] + first * (b - a)[chosen] + second * (c - a)[chosen]
+    normals = outward / np.maximum(areas, np.finfo(float).tiny)[:, np.newaxis]
+    return places, -normals[chosen], normals

@@ -1,4 +1,4 @@
-"""How far triangles are from the faces they stand for, and what volume they enclose.
+"""Deviation of triangles from the faces they stand for, and the volume they enclose.
 
 Everything is linear in the control points: of each template there are matrices, and all patches that share it are
 measured by a few products.
@@ -35,7 +35,7 @@ _ACROSS_KNOTS = np.array([0.0, 0.0, 1.0, 1.0])
 
 
 def canonical_edges(wall: Wall, edges: Integers) -> tuple[Integers, Integers]:
-    """Where edges are evaluated, once for all that share them.
+    """Patches on which edges are evaluated, once for all that share them.
 
     Returns
     -------
@@ -83,13 +83,13 @@ def face_deviations(wall: Wall, cases: Integers) -> Floats:
 def side_deviations(
     wall: Wall, free: Integers, steps: Integers, template: Callable[[int], Template]
 ) -> tuple[Floats, Integers]:
-    """The same of distinct side walls with distinct steps along them, and which of them each free edge has.
+    """Deviations of distinct side walls with distinct steps along them, and the one that each boundary edge has.
 
     Parameters
     ----------
     wall : Wall
-    free : ndarray of int, shape (free edges,)
-    steps : ndarray of int, shape (free edges,)
+    free : ndarray of int, shape (boundary edges,)
+    steps : ndarray of int, shape (boundary edges,)
     template : callable
         From the steps along a side wall to its triangles.
     """
@@ -132,7 +132,7 @@ def _by_template(cases: Integers) -> Iterator[tuple[Template, Integers]]:
 
 
 def _side_cases(wall: Wall, free: Integers, steps: Integers) -> tuple[Integers, Integers]:
-    """Distinct pairs of steps and canonical edge, and which of them each free edge has."""
+    """Distinct pairs of steps and canonical edge, and which of them each boundary edge has."""
     keys, which = np.unique(np.column_stack([steps, canonical_edges(wall, free)[1]]), axis=0, return_inverse=True)
     return keys, which.ravel()
 
@@ -188,7 +188,7 @@ def _deviations(chords: Floats, rates: Floats, controls: Floats) -> Floats:
 
 
 def _sums(template: Template, nodes: Floats, controls: Floats) -> Floats:
-    """Of surfaces, the sum over triangles of det(a, b, c) / 6, and that of the vectors of area; (surfaces, 4)."""
+    """Sums over the triangles of surfaces of det(a, b, c) / 6 and of the vectors of area; shape (surfaces, 4)."""
     points = _components(nodes, controls)
     a, b, c = (points[:, :, template.triangles[:, k]] for k in range(3))
     twice = cross(b - a, c - a)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.files import replacing
-from gyroid_cad.common.progress import Progress, tell
+from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.triangles.corners import Corners, FaceGroup, face_groups, side_groups
 from gyroid_cad.mesh.triangles.triangulation import Triangulation
@@ -73,7 +73,7 @@ def write_stl(
     total = triangulation.triangle_count
     if total > MOST_TRIANGLES:
         raise ParameterError("output", str(path), f"at most {MOST_TRIANGLES:,} triangles in STL; these are {total:,}")
-    tell(progress, stage, 0, total)
+    report_progress(progress, stage, 0, total)
     with replacing(path) as temporary, temporary.open("wb") as file:
         file.write(_HEADER + np.uint32(total).astype("<u4").tobytes())
         written = flushed = 0
@@ -83,7 +83,7 @@ def write_stl(
             if (written - flushed) * _RECORD.itemsize > _FLUSHED_BYTES:
                 _start_writing(file.fileno())
                 flushed = written
-            tell(progress, stage, written, total)
+            report_progress(progress, stage, written, total)
 
 
 def _start_writing(file: int) -> None:
@@ -100,7 +100,7 @@ class _Space:
         self._corners = np.empty((3, 0), dtype=_SIXTEEN_BYTES)
 
     def records(self, count: int) -> NDArray[np.void]:
-        """So many records, with what was left in them."""
+        """Buffer of so many records, with what was left in them."""
         if len(self._records) < count:
             self._records = np.zeros(count, _RECORD)
         return self._records[:count]

@@ -1,4 +1,4 @@
-"""How a patch, or a side wall, is cut into triangles in the square of its parameters.
+"""Templates by which a patch, or a side wall, is cut into triangles in the square of its parameters.
 
 The steps inside a patch and along each of its edges may differ. Whatever they are, a template has on an edge exactly
 the places of the edge's own steps, so patches that share an edge share its places, and nothing has to be merged.
@@ -117,7 +117,7 @@ def rational_basis(weights: Floats, knots: tuple[Floats, Floats], places: Floats
 
 
 def rational_basis_and_rates(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
-    """The same and their derivatives by u and by v, by the quotient rule; shape (3, places, n m)."""
+    """Rational basis functions and their derivatives by u and by v, by the quotient rule; shape (3, places, n m)."""
     (u, u_rate), (v, v_rate) = ([_along(weights, knots, places, axis, k) for k in (0, 1)] for axis in (0, 1))
     weighted = _weighted(u, v, weights)
     total = weighted.sum(axis=1, keepdims=True)
@@ -170,13 +170,13 @@ def _grid_triangles(numbers: Integers) -> Integers:
     return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
-def _stitched(outer: Integers, rim: Integers, outer_at: Floats, rim_at: Floats) -> Integers:
+def _stitched(outer: Integers, rim: Integers, outer_at: Floats, inner_at: Floats) -> Integers:
     """Triangles between an edge and the rim inside it that runs the same way, the rim to its left."""
     triangles = []
     i = j = 0
     while i < len(outer) - 1 or j < len(rim) - 1:
-        to_outer = abs(outer_at[i + 1] - rim_at[j]) if i < len(outer) - 1 else np.inf
-        to_rim = abs(outer_at[i] - rim_at[j + 1]) if j < len(rim) - 1 else np.inf
+        to_outer = abs(outer_at[i + 1] - inner_at[j]) if i < len(outer) - 1 else np.inf
+        to_rim = abs(outer_at[i] - inner_at[j + 1]) if j < len(rim) - 1 else np.inf
         if to_outer <= to_rim:
             triangles.append((outer[i], outer[i + 1], rim[j]))
             i += 1

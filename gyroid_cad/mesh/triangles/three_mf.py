@@ -64,7 +64,7 @@ def write_3mf(vertices: NDArray[np.float32], triangles: NDArray[np.int32], path:
 
 
 def _written(writer: Any) -> memoryview:
-    """What a writer of lib3mf writes: into memory, for to a file on a full disk it ends the whole process."""
+    """Bytes that a writer of lib3mf writes: into memory, for to a file on a full disk it ends the whole process."""
     import lib3mf
 
     package = BytesIO()

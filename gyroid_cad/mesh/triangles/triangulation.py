@@ -12,14 +12,153 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.mesh.triangles.measuring import enclosed_volume
-from gyroid_cad.mesh.triangles.subdivision import Subdivision, subdivided
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.mesh.triangles.measuring import enclosed_volume, face_cases, face_deviations, side_deviations
+from gyroid_cad.mesh.triangles.templates import FEWEST_STEPS, Template, wall_template
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Triangulation", "triangulated"]
+__all__ = ["Subdivision", "Triangulation", "subdivided", "triangulated"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+# Between the places measured a triangle may be further off: of a quadratic surface by at most 3 %.
+_MARGIN = 1.05
+_FIRST_STEPS = 8
+# There triangles are nearer to the faces, about 1e-5 of the cell size, than the usual fit is to the exact gyroid.
+MOST_STEPS = 128
+# Between the deviation that would just do and the one named as possible: corners are offset, counts rounded up.
+_SLACK = 1.5
+# Where counts are more than these they are rounded up to three binary digits, so that few templates are needed.
+_FEW_COUNTS = 4
+# Of a side wall's deviation, what its curved edges may take; its twist takes the rest.
+_SHARE_OF_EDGES = 0.5
+# Counts come from floating-point roots: a whole number that came out a hair above itself is still that number.
+_HAIR = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subdivision:
+    """Steps of every patch and edge, and how near their triangles come.
+
+    Attributes
+    ----------
+    patch_steps : ndarray of int, shape (patches,)
+        Along each side of a patch, inside it.
+    edge_steps : ndarray of int, shape (edges,)
+    across : int
+        Of the free side walls, through the wall.
+    deviation : float
+        Largest measured, in mm.
+    """
+
+    patch_steps: Integers
+    edge_steps: Integers
+    across: int
+    deviation: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+def subdivided(wall: Wall, deviation: float, reserved: float = 0.0) -> Subdivision:
+    """The fewest steps with which triangles that have their corners on the wall keep within a deviation.
+
+    Parameters
+    ----------
+    wall : Wall
+    deviation : float
+        Largest distance of a triangle from the wall's faces and side walls, in mm.
+    reserved : float
+        What of it is not to be used, in mm.
+
+    Raises
+    ------
+    ParameterError
+        If a patch would take too many steps, saying which deviation would do.
+    """
+    limit = (deviation - reserved) / _MARGIN
+    distinct = np.arange(len(wall.nets))
+    first = np.column_stack([np.full((len(distinct), 5), _FIRST_STEPS), distinct])
+    patch_steps = _rounded(_enough(first[:, 0], face_deviations(wall, first), limit))[wall.patch_net]
+    free = np.flatnonzero(wall.complex.free)
+    while True:
+        _require_few(patch_steps, deviation)
+        edge_steps = _steps_of_edges(wall, patch_steps)
+        edge_steps[free] = _rounded(_steps_of_side_walls(wall, free, edge_steps[free], limit))
+        _require_few(edge_steps, deviation)
+        cases, which = face_cases(wall, patch_steps, edge_steps)
+        faces = face_deviations(wall, cases)
+        if faces.max() <= limit:
+            break
+        patch_steps = _rounded(np.maximum(patch_steps, _enough(cases[:, 0], faces, limit)[which]))
+    across, sides = _through(wall, free, edge_steps[free], limit)
+    return Subdivision(patch_steps, edge_steps, across, max(float(faces.max()), sides))
+
+
+def _enough(steps: Integers, deviation: Floats, limit: float) -> Integers:
+    """Steps that would do, from what some steps gave: the deviation goes with 1 / n^2."""
+    more = np.ceil(steps * np.sqrt(deviation / limit) * (1 - _HAIR)).astype(np.int64)
+    # Where they do not do yet, one more at least.
+    return np.asarray(np.maximum(np.where(deviation > limit, np.maximum(more, steps + 1), more), FEWEST_STEPS))
+
+
+def _rounded(steps: Integers) -> Integers:
+    """As they are where few numbers occur, else rounded up to three binary digits."""
+    if len(np.unique(steps)) <= _FEW_COUNTS:
+        return steps
+    unit = 2 ** np.maximum(0, np.floor(np.log2(steps)).astype(np.int64) - 2)
+    return np.asarray(-(-steps // unit) * unit)
+
+
+def _require_few(steps: Integers, deviation: float) -> None:
+    most = int(steps.max())
+    if most > MOST_STEPS:
+        possible = deviation * (most / MOST_STEPS) ** 2 * _SLACK
+        raise ParameterError(
+            "deviation",
+            deviation,
+            f"about {possible:.1e} mm or more: it takes {most} x {most} squares a patch, {MOST_STEPS} x {MOST_STEPS} "
+            "are the most",
+        )
+
+
+def _steps_of_edges(wall: Wall, patch_steps: Integers) -> Integers:
+    """Steps of every edge, the more of its two patches'."""
+    steps = np.zeros(wall.complex.edge_count, dtype=np.int64)
+    np.maximum.at(steps, wall.complex.patch_edges.ravel(), np.repeat(patch_steps, 4))
+    return steps
+
+
+def _steps_of_side_walls(wall: Wall, free: Integers, steps: Integers, limit: float) -> Integers:
+    """Steps along boundary edges, raised where the lines along the side walls would take too much of the deviation."""
+    while np.all(steps <= MOST_STEPS):
+        deviations, which = side_deviations(wall, free, steps, _lines_along)
+        enough = np.maximum(steps, _enough(steps, deviations[which], _SHARE_OF_EDGES * limit))
+        if np.array_equal(enough, steps):
+            break
+        steps = enough
+    return steps
+
+
+def _through(wall: Wall, free: Integers, steps: Integers, limit: float) -> tuple[int, float]:
+    """Steps through the wall with which all side walls keep within the deviation, and what it is with them."""
+    across = 1
+    while True:
+        deviations, _ = side_deviations(wall, free, steps, lambda along: wall_template(along, across))  # noqa: B023
+        worst = float(deviations.max(initial=0.0))
+        if worst <= limit:
+            return across, worst
+        # What the twist takes falls with 1 / n; the curved edges take at most their share.
+        across = max(across + 1, int(np.ceil(across * worst / limit * (1 - _HAIR))))
+
+
+def _lines_along(along: int) -> Template:
+    """The lines along a side wall at both its edges and half way between, without triangles."""
+    full = wall_template(along, 2)
+    same = full.places[full.sides[:, 0], 1] == full.places[full.sides[:, 1], 1]
+    return Template(full.places, np.empty((0, 3), dtype=np.int64), full.sides[same])
+
 
 # How far triangles that touch in a line without belonging together are parted: a thousandth of the deviation, but
 # enough for the single-precision numbers of STL and 3MF to tell them apart. The kernel's writer does the same.
@@ -33,7 +172,7 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangulation:
-    """How a wall is cut into triangles.
+    """Triangulation of a wall.
 
     Attributes
     ----------
@@ -46,7 +185,7 @@ class Triangulation:
         Steps of the free side walls, through the wall.
     deviation : float
         Largest distance of a triangle from the wall's faces, in mm, as measured.
-    laid_off : float
+    volume_offset : float
         In mm, how far from the wall's faces the corners lie at most.
     parting : float
         In mm, how far corners are moved where patches touch in a line without joining.
@@ -59,7 +198,7 @@ class Triangulation:
     edge_steps: Integers
     across: int
     deviation: float
-    laid_off: float
+    volume_offset: float
     parting: float
     volume: float
 
@@ -68,7 +207,7 @@ class Triangulation:
 
     @property
     def triangle_count(self) -> int:
-        """Of both faces and the free side walls."""
+        """Count of the triangles of both faces and the side walls."""
         edges = self.edge_steps[self.wall.complex.patch_edges].sum()
         faces = np.sum(2 * (self.patch_steps - 2) ** 2 + 4 * (self.patch_steps - 2)) + edges
         return int(2 * faces + 2 * self.across * self.edge_steps[self.wall.complex.free].sum())
@@ -78,7 +217,7 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
     """Find the steps with which triangles keep within a deviation of a wall.
 
     Triangles with their corners on the faces of a gyroid wall enclose too little, about as much as they deviate. So
-    the corners are laid off along the lines through the wall, all by the same small part of its thickness, until
+    the corners are offset along the lines through the wall, all by the same small part of its thickness, until
     the triangles enclose the wall's own volume. Faces, edges and side walls stay those of one wall, a little thicker,
     and the deviation counts what was added.
 
@@ -93,16 +232,16 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
     ParameterError
         If a patch would take too many steps, saying which deviation would do.
     """
-    volume, thickest = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
+    volume, max_thickness = wall.volume(), float(np.linalg.norm(wall.nets[:, 1] - wall.nets[:, 0], axis=-1).max())
     reserved = 0.0
     while True:
         steps = subdivided(wall, deviation, reserved)
         thicker, enclosed, part = _of_volume(wall, steps, volume)
-        laid_off = abs(part) * thickest
-        if steps.deviation + laid_off <= deviation:
+        volume_offset = abs(part) * max_thickness
+        if steps.deviation + volume_offset <= deviation:
             break
-        # What is laid off falls with the rest: never all is reserved for it.
-        reserved = min(laid_off, (deviation + reserved) / 2)
+        # What is offset falls with the rest: never all is reserved for it.
+        reserved = min(volume_offset, (deviation + reserved) / 2)
     furthest = float(np.abs(thicker.nets).max() + np.abs(wall.shifts).max())
     parting = max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
     return Triangulation(
@@ -110,15 +249,15 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
         patch_steps=steps.patch_steps,
         edge_steps=steps.edge_steps,
         across=steps.across,
-        deviation=steps.deviation + laid_off,
-        laid_off=laid_off,
+        deviation=steps.deviation + volume_offset,
+        volume_offset=volume_offset,
         parting=parting,
         volume=enclosed,
     )
 
 
 def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, float, float]:
-    """The wall laid off so that its triangles enclose a volume, what they enclose, and by which part of itself."""
+    """The wall offset so that its triangles enclose a volume, what they enclose, and by which part of itself."""
     part, thicker = 0.0, wall
     enclosed = enclosed_volume(wall, steps.patch_steps, steps.edge_steps, steps.across)
     # Of a thin wall the volume goes with the thickness, which grows on both sides.
@@ -126,7 +265,7 @@ def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, flo
     for _ in range(_SECANT_STEPS):
         if abs(following - part) < _NOTHING:
             break
-        thicker = _laid_off(wall, following)
+        thicker = _offset(wall, following)
         found = enclosed_volume(thicker, steps.patch_steps, steps.edge_steps, steps.across)
         slope = (found - enclosed) / (following - part)
         part, enclosed = following, found
@@ -134,7 +273,7 @@ def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, flo
     return thicker, enclosed, part
 
 
-def _laid_off(wall: Wall, part: float) -> Wall:
+def _offset(wall: Wall, part: float) -> Wall:
     """The wall with both faces moved outwards by a part of its thickness."""
     through = part * (wall.nets[:, 1] - wall.nets[:, 0])
     return replace(wall, nets=wall.nets + np.stack([-through, through], axis=1))

@@ -12,14 +12,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.determinants import hexahedron_nodes, sample_places, shape_gradients
 from gyroid_cad.mesh.finite_elements.quality import (
     USUAL_BOUNDS,
     combined,
     element_measures,
+    hexahedron_nodes,
     inverted,
     quality_report,
     quality_rows,
+    sample_points,
+    shape_gradients,
 )
 
 Floats = NDArray[np.float64]
@@ -62,8 +64,8 @@ def test_squares_and_cubes_are_perfect(element: Floats) -> None:
         "edge_ratio": 1,
         "skew": 0,
         "warpage": 0,
-        "smallest_angle": 90,
-        "largest_angle": 90,
+        "min_angle": 90,
+        "max_angle": 90,
         "determinant_ratio": 1,
         "sampled_scaled_jacobian": 1,
     }
@@ -81,8 +83,8 @@ def test_a_parallelepiped_is_measured_by_its_three_edges(matrix: Floats) -> None
     assert values["aspect_ratio"] == pytest.approx(lengths.max() / lengths.min())
     assert values["edge_ratio"] == pytest.approx(lengths.max() / lengths.min())
     assert values["skew"] == pytest.approx(cosines.max(), abs=1e-11)
-    assert values["smallest_angle"] == pytest.approx(np.degrees(np.arccos(cosines.max())), abs=1e-6)
-    assert values["largest_angle"] == pytest.approx(180 - values["smallest_angle"])
+    assert values["min_angle"] == pytest.approx(np.degrees(np.arccos(cosines.max())), abs=1e-6)
+    assert values["max_angle"] == pytest.approx(180 - values["min_angle"])
     assert values["warpage"] == pytest.approx(0, abs=1e-11)
     assert values["determinant_ratio"] == pytest.approx(np.sign(np.linalg.det(matrix)), abs=1e-9)
 
@@ -119,7 +121,7 @@ def test_reflecting_a_hexahedron_or_its_numbering_turns_the_sign_of_its_determin
         before, after = measures_of(sound), measures_of(turned_over)
         assert before["scaled_jacobian"] > 0 > after["scaled_jacobian"]
         assert after["determinant_ratio"] == pytest.approx(-1)
-        for name in ("aspect_ratio", "edge_ratio", "skew", "warpage", "smallest_angle", "largest_angle"):
+        for name in ("aspect_ratio", "edge_ratio", "skew", "warpage", "min_angle", "max_angle"):
             assert after[name] == pytest.approx(before[name], rel=1e-9, abs=1e-9)
     parallel = CUBE @ np.array([[1, 0.3, 0], [0, 1, 0.2], [0.4, 0, 1]])
     reflected = values_of(parallel * [-1, 1, 1])
@@ -129,7 +131,7 @@ def test_reflecting_a_hexahedron_or_its_numbering_turns_the_sign_of_its_determin
 @pytest.mark.parametrize("count", [8, 20, 27])
 def test_shape_functions_carry_linear_maps_exactly(count: int) -> None:
     matrix = np.random.default_rng(1).normal(size=(3, 3))
-    gradients = shape_gradients(count, sample_places(count))
+    gradients = shape_gradients(count, sample_points(count))
     nodes = hexahedron_nodes(count) @ matrix.T + [3, 2, 1]
     columns = gradients @ nodes
     np.testing.assert_allclose(columns, np.broadcast_to(matrix.T[:, np.newaxis], columns.shape), atol=1e-13)
@@ -181,9 +183,7 @@ def test_a_report_summarises_what_each_element_measures() -> None:
         assert np.abs(summary.counts - np.histogram(inside, summary.edges)[0]).sum() <= 2
         assert summary.counts.sum() == len(cells)
         worst = (
-            np.argmin(values)
-            if name.endswith(("jacobian", "smallest_angle", "determinant_ratio"))
-            else np.argmax(values)
+            np.argmin(values) if name.endswith(("jacobian", "min_angle", "determinant_ratio")) else np.argmax(values)
         )
         assert summary.worst_element == worst
         np.testing.assert_allclose(summary.worst_place, points[cells[worst]].mean(axis=0))
@@ -205,7 +205,7 @@ def test_elements_beyond_a_bound_are_counted_on_the_bad_side_of_it() -> None:
     summaries = quality_report(points, cells, {"scaled_jacobian": 0.7, "skew": 0.2}).measures
     assert summaries["scaled_jacobian"].beyond == np.sum(measures["scaled_jacobian"] < 0.7) > 0
     assert summaries["skew"].beyond == np.sum(measures["skew"] > 0.2) > 0
-    assert summaries["largest_angle"].bound == USUAL_BOUNDS["largest_angle"]
+    assert summaries["max_angle"].bound == USUAL_BOUNDS["max_angle"]
 
 
 def test_elements_without_a_number_are_counted_apart_and_are_the_worst() -> None:

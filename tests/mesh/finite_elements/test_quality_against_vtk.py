@@ -11,8 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gyroid_cad.mesh.finite_elements.determinants import HEXAHEDRA, hexahedron_nodes, shape_gradients
-from gyroid_cad.mesh.finite_elements.quality import element_measures
+from gyroid_cad.mesh.finite_elements.quality import HEXAHEDRA, element_measures, hexahedron_nodes, shape_gradients
 
 Floats = NDArray[np.float64]
 
@@ -30,8 +29,8 @@ QUADRILATERAL_FILTERS = {
     "edge_ratio": "EdgeRatio",
     "skew": "Skew",
     "warpage": "Warpage",
-    "smallest_angle": "MinAngle",
-    "largest_angle": "MaxAngle",
+    "min_angle": "MinAngle",
+    "max_angle": "MaxAngle",
 }
 
 
@@ -88,7 +87,7 @@ def assert_agrees_on_quadrilaterals(corners: Floats) -> None:
         np.testing.assert_allclose(ours[name], theirs[name], **CLOSE, err_msg=name)
     # VTK's warpage lacks the manual's "1 -".
     np.testing.assert_allclose(ours["warpage"], 1 - theirs["warpage"], **CLOSE)
-    for name in ("smallest_angle", "largest_angle"):
+    for name in ("min_angle", "max_angle"):
         assert_same_angles(ours[name], theirs[name])
 
 
@@ -96,7 +95,7 @@ def test_quadrilaterals_agree_with_vtk_from_square_to_crossed() -> None:
     corners = perturbed(SQUARE, 1500, 1)
     ours = measures_of(corners)
     assert ours["scaled_jacobian"].min() < -0.5 < 0.99 < ours["scaled_jacobian"].max()
-    assert ours["largest_angle"].max() > 180
+    assert ours["max_angle"].max() > 180
     assert_agrees_on_quadrilaterals(corners)
 
 
@@ -113,8 +112,8 @@ def test_warpage_and_angles_of_a_hexahedron_are_those_of_its_worst_face() -> Non
     ours = measures_of(corners)
     faces = [vtk_quadrilaterals(corners[:, face]) for face in FACES]
     np.testing.assert_allclose(ours["warpage"], 1 - np.min([face["warpage"] for face in faces], axis=0), **CLOSE)
-    assert_same_angles(ours["smallest_angle"], np.min([face["smallest_angle"] for face in faces], axis=0))
-    assert_same_angles(ours["largest_angle"], np.max([face["largest_angle"] for face in faces], axis=0))
+    assert_same_angles(ours["min_angle"], np.min([face["min_angle"] for face in faces], axis=0))
+    assert_same_angles(ours["max_angle"], np.max([face["max_angle"] for face in faces], axis=0))
 
 
 def rotations_of_the_cube() -> list[NDArray[np.int64]]:
@@ -179,8 +178,8 @@ def test_crossed_and_straight_quadrilaterals_agree_with_vtk(corners: Floats) -> 
 
 def test_a_straight_angle_is_180_degrees_here_and_less_in_vtk() -> None:
     corners = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 0.5, 0], [0, 1, 0]]])
-    assert measures_of(corners)["largest_angle"] == pytest.approx(180, abs=1e-12)
-    assert 1e-7 < 180 - vtk_quadrilaterals(corners)["largest_angle"] < 1e-5
+    assert measures_of(corners)["max_angle"] == pytest.approx(180, abs=1e-12)
+    assert 1e-7 < 180 - vtk_quadrilaterals(corners)["max_angle"] < 1e-5
 
 
 @pytest.mark.parametrize("edge", range(4))
@@ -189,7 +188,7 @@ def test_a_quadrilateral_with_an_edge_of_no_length_is_among_the_worst_whichever_
     corners[(edge + 1) % 4] = corners[edge]
     ours, theirs = measures_of(corners[np.newaxis]), vtk_quadrilaterals(corners[np.newaxis])
     assert ours["scaled_jacobian"] == 0
-    assert (ours["smallest_angle"], ours["largest_angle"]) == (0, 180)
+    assert (ours["min_angle"], ours["max_angle"]) == (0, 180)
     for name in ("aspect_ratio", "edge_ratio", "skew"):
         np.testing.assert_allclose(ours[name], theirs[name], **CLOSE, err_msg=name)
     np.testing.assert_allclose(ours["warpage"], 1 - theirs["warpage"], **CLOSE)
@@ -197,7 +196,7 @@ def test_a_quadrilateral_with_an_edge_of_no_length_is_among_the_worst_whichever_
     if edge == 2:
         assert theirs["scaled_jacobian"] > 0.5
     else:
-        assert (theirs["smallest_angle"], theirs["largest_angle"]) == (360, 0)
+        assert (theirs["min_angle"], theirs["max_angle"]) == (360, 0)
 
 
 @pytest.mark.parametrize("edge", [(0, 1), (2, 6), (7, 4)])

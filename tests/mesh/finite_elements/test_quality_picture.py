@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.determinants import hexahedron_nodes
-from gyroid_cad.mesh.finite_elements.quality import Quality, quality_report
-from gyroid_cad.mesh.finite_elements.quality_picture import draw_quality
+from gyroid_cad.mesh.finite_elements.quality import Quality, hexahedron_nodes, quality_report
+from gyroid_cad.mesh.finite_elements.summaries import draw_quality
 
 image = pytest.importorskip("matplotlib.image", reason="pictures need matplotlib")
 

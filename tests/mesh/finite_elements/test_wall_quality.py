@@ -14,7 +14,7 @@ from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.finite_elements.hexahedra import hexahedra
 from gyroid_cad.mesh.finite_elements.quality import Quality, inverted, quality_report
 from gyroid_cad.surface.patch import PARAMETERISATIONS
-from gyroid_cad.wall.fitted import LaidWall
+from gyroid_cad.wall.fitted import FittedWall
 
 CELL_SIZE = 10.0
 STEPS, LAYERS = 20, 3
@@ -58,16 +58,16 @@ def test_no_grid_makes_the_corner_of_a_patch_better_than_its_sixty_degrees() -> 
 
 
 @pytest.fixture(scope="module")
-def thick() -> LaidWall:
+def thick() -> FittedWall:
     """Its faces pushed apart from 0.1 L to 0.4 L, past the 0.37647 L at which their curvature breaks."""
-    laid = LATTICES["uniform"].laid()
-    below, above = np.moveaxis(laid.wall.nets, 1, 0)
+    fitted = LATTICES["uniform"].fitted()
+    below, above = np.moveaxis(fitted.wall.nets, 1, 0)
     middle, half = (below + above) / 2, (above - below) / 2
-    return replace(laid, wall=replace(laid.wall, nets=np.stack([middle - 4 * half, middle + 4 * half], axis=1)))
+    return replace(fitted, wall=replace(fitted.wall, nets=np.stack([middle - 4 * half, middle + 4 * half], axis=1)))
 
 
 def test_a_wall_past_its_curvature_limit_is_inverted_at_the_middle_of_every_patch_where_it_is_curved_most(
-    thick: LaidWall,
+    thick: FittedWall,
 ) -> None:
     mesh = hexahedra(thick.wall, STEPS, LAYERS)
     found = inverted(mesh.points, mesh.cells)
@@ -77,7 +77,7 @@ def test_a_wall_past_its_curvature_limit_is_inverted_at_the_middle_of_every_patc
     assert np.all(found.determinants <= 0)
 
 
-def test_elements_turned_inside_out_are_refused_with_one_of_their_places(thick: LaidWall) -> None:
+def test_elements_turned_inside_out_are_refused_with_one_of_their_places(thick: FittedWall) -> None:
     with pytest.raises(ParameterError, match=r"thickness = 1.0: expected a thinner wall, .* near \(.*\) mm") as caught:
         hexahedral_mesh(thick, STEPS, LAYERS, 1, False)
     place = [float(number) for number in re.findall(r"\((.*?)\)", str(caught.value))[0].split(",")]

@@ -14,9 +14,9 @@ from volume_cases import CELL_SIZE, constant_wall, volumes_named, wall_named
 from volume_readers import FREE, SIDE_0, SIDE_1, Multipatch, Problem, solved, u_fastest
 
 from gyroid_cad.mesh.iga.patches import periodic_points, wall_volumes
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
+from gyroid_cad.surface.symmetry import bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import Wall, build_wall
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from gyroid_cad import Cylinder, FitSettings, Lattice, fit_patch, linear
 from gyroid_cad.mesh.iga.patches import VolumePatches, wall_volumes
-from gyroid_cad.surface.bounding_cells import bounding_cell
 from gyroid_cad.surface.families import USUAL
-from gyroid_cad.surface.symmetry import Placements
+from gyroid_cad.surface.symmetry import Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import Wall, build_wall
 

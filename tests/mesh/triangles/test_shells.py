@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from gyroid_cad.mesh.triangles.shells import Shells, shells_of
+from gyroid_cad.mesh.triangles.measures import TriangleMeasures, triangle_measures
 
 
 def ball(radius: float, centre: float = 0.0, void: bool = False) -> trimesh.Trimesh:
@@ -17,9 +17,9 @@ def ball(radius: float, centre: float = 0.0, void: bool = False) -> trimesh.Trim
     return made
 
 
-def of(*parts: trimesh.Trimesh) -> Shells:
+def of(*parts: trimesh.Trimesh) -> TriangleMeasures:
     mesh = trimesh.util.concatenate(parts)
-    return shells_of(mesh.vertices, mesh.faces)
+    return triangle_measures(mesh.vertices, mesh.faces)
 
 
 def test_a_ball_is_one_closed_piece_of_its_own_volume() -> None:
@@ -47,15 +47,15 @@ def test_a_ball_turned_inwards_beside_another_is_inside_out_not_a_void() -> None
 
 def test_without_one_triangle_three_edges_are_open() -> None:
     made = ball(1.0)
-    assert shells_of(made.vertices, made.faces[1:]).open_edges == 3
-    assert not shells_of(made.vertices, made.faces[1:]).closed
+    assert triangle_measures(made.vertices, made.faces[1:]).open_edges == 3
+    assert not triangle_measures(made.vertices, made.faces[1:]).closed
 
 
 def test_one_triangle_turned_over_opens_its_three_edges() -> None:
     made = ball(1.0)
     faces = np.array(made.faces)
     faces[5] = faces[5, ::-1]
-    assert shells_of(made.vertices, faces).open_edges == 3
+    assert triangle_measures(made.vertices, faces).open_edges == 3
 
 
 def test_two_cubes_that_touch_in_one_vertex_are_two_pieces() -> None:
@@ -64,11 +64,11 @@ def test_two_cubes_that_touch_in_one_vertex_are_two_pieces() -> None:
     both = trimesh.util.concatenate([corner, other])
     both.merge_vertices()
     assert len(both.vertices) == 15
-    assert shells_of(both.vertices, both.faces).pieces == 2
+    assert triangle_measures(both.vertices, both.faces).pieces == 2
 
 
 def test_where_a_solid_stands_changes_neither_volumes_nor_voids() -> None:
     mesh = trimesh.util.concatenate([ball(3.0), ball(1.0, void=True)])
-    moved = shells_of(mesh.vertices + np.array([1e4, -2e4, 3e3]), mesh.faces)
-    assert moved.volumes == pytest.approx(shells_of(mesh.vertices, mesh.faces).volumes, rel=1e-6)
+    moved = triangle_measures(mesh.vertices + np.array([1e4, -2e4, 3e3]), mesh.faces)
+    assert moved.volumes == pytest.approx(triangle_measures(mesh.vertices, mesh.faces).volumes, rel=1e-6)
     assert moved.trapped_voids == 1

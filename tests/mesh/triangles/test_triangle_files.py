@@ -12,7 +12,7 @@ import trimesh
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.shells import shells_of
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 from gyroid_cad.surface.fit import FitSettings
 
 BOX = trimesh.creation.box([3, 2, 1])
@@ -39,10 +39,10 @@ def placed_3mf(path: Path, unit: lib3mf.ModelUnit) -> None:
 def test_our_own_files_come_back_closed_and_of_the_same_volume(ending: str, tmp_path: Path) -> None:
     lattice, path = Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(5)), tmp_path / f"a.{ending}"
     lattice.write(path, deviation=0.1)
-    shells = shells_of(*read_triangles(path))
-    assert shells.closed
-    assert int(shells.triangles.sum()) == lattice.triangle_report(0.1).triangles
-    assert shells.volumes.sum() == pytest.approx(lattice.triangle_report(0.1).volume, rel=1e-5)
+    found = triangle_measures(*read_triangles(path))
+    assert found.closed
+    assert found.triangles == lattice.triangle_report(0.1).triangles
+    assert found.volume == pytest.approx(lattice.triangle_report(0.1).volume, rel=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["stl", "stl_ascii"])
@@ -52,7 +52,7 @@ def test_binary_and_text_stl_of_other_programs_are_the_same(kind: str, tmp_path:
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     vertices, triangles = read_triangles(path)
     assert (len(vertices), len(triangles)) == (8, 12)
-    assert shells_of(vertices, triangles).volumes == pytest.approx([6.0])
+    assert triangle_measures(vertices, triangles).volumes == pytest.approx([6.0])
 
 
 def test_a_binary_file_whose_header_begins_like_text_is_told_by_its_size(tmp_path: Path) -> None:
@@ -71,8 +71,7 @@ def test_3mf_says_its_unit_and_where_its_parts_stand(
     placed_3mf(tmp_path / "a.3mf", unit)
     vertices, triangles = read_triangles(tmp_path / "a.3mf")
     assert np.ptp(vertices, axis=0) == pytest.approx(np.array([13.0, 2.0, 1.0]) * millimetres)
-    shells = shells_of(vertices, triangles)
-    assert shells.volumes == pytest.approx(2 * [6 * millimetres**3])
+    assert triangle_measures(vertices, triangles).volumes == pytest.approx(2 * [6 * millimetres**3])
 
 
 def test_triangles_without_area_are_left_out(tmp_path: Path) -> None:

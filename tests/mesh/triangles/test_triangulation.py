@@ -20,8 +20,7 @@ from gyroid_cad.fields.makers import linear
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.measuring import enclosed_volume, face_cases, face_deviations
-from gyroid_cad.mesh.triangles.subdivision import MOST_STEPS, subdivided
-from gyroid_cad.mesh.triangles.triangulation import Triangulation, triangulated
+from gyroid_cad.mesh.triangles.triangulation import MOST_STEPS, Triangulation, subdivided, triangulated
 from gyroid_cad.nurbs.surface import NurbsSurface
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.offset import SIDES, Wall
@@ -66,7 +65,7 @@ def assert_closed(triangulation: Triangulation) -> trimesh.Trimesh:
 @pytest.mark.parametrize("cells", [(1, 1, 1), (2, 2, 1), (2, 2, 2)])
 def test_the_triangles_are_closed_though_the_wall_touches_itself_in_lines(cells: tuple[int, int, int]) -> None:
     triangulation = triangulated(Lattice(cells, L, 0.8, fit=COARSE).wall(), 0.1)
-    assert triangulation.wall.complex.pinch_lines > 0
+    assert triangulation.wall.complex.non_manifold_edges > 0
     assert assert_closed(triangulation).body_count == 1
 
 
@@ -207,7 +206,7 @@ def test_one_step_less_would_be_too_few() -> None:
 
 
 def test_the_deviation_and_the_missing_volume_fall_with_the_square_of_the_steps() -> None:
-    """Of triangles with their corners on the faces, before they are laid off."""
+    """Of triangles with their corners on the faces, before they are offset."""
     wall = Lattice((1, 1, 1), L, 0.8).wall()
     counts = np.array([16, 32, 64])
     missing, deviation = [], []
@@ -223,10 +222,10 @@ def test_what_corners_are_laid_off_falls_with_the_deviation_and_makes_up_the_vol
     wall = Lattice((2, 1, 1), L, 0.8).wall()
     deviations = np.array([0.1, 0.01, 0.001])
     made = [triangulated(wall, deviation) for deviation in deviations.tolist()]
-    laid_off = [triangulation.laid_off for triangulation in made]
-    assert np.polyfit(np.log(deviations), np.log(laid_off), 1)[0] == pytest.approx(1, abs=0.15)
+    volume_offset = [triangulation.volume_offset for triangulation in made]
+    assert np.polyfit(np.log(deviations), np.log(volume_offset), 1)[0] == pytest.approx(1, abs=0.15)
     for triangulation, deviation in zip(made, deviations, strict=True):
-        assert triangulation.laid_off < 0.1 * deviation
+        assert triangulation.volume_offset < 0.1 * deviation
         assert triangulation.volume == pytest.approx(wall.volume(), rel=1e-6)
         assert assert_closed(triangulation).volume == pytest.approx(wall.volume(), rel=1e-5)
 

@@ -10,7 +10,7 @@ import trimesh
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.wall_thickness import measured_walls
+from gyroid_cad.mesh.triangles.measures import measured_walls
 from gyroid_cad.surface.fit import FitSettings
 
 PLACES = 400

@@ -15,16 +15,17 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel import region_split, regions
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import hollow
-from gyroid_cad.kernel.solid import realise_faces
+from gyroid_cad.kernel.solid import build_faces
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
@@ -72,9 +73,9 @@ def lattice_in(part: Part) -> tuple[Faces, Faces]:
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
     cloud, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.holds)
+    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.contains)
     wall = build_wall(complex, fit_patch(COARSE), L, THICKNESS).moved(FRAME.rotation, FRAME.origin)
-    faces = [(TopoDS.Face_s(below.Reversed()), above) for below, above in realise_faces(wall)]
+    faces = [(as_face(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (
         [face for patch in np.flatnonzero(sides == side) for face in faces[patch]] for side in (CROSSING, INSIDE)
     )

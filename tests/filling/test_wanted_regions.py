@@ -22,7 +22,7 @@ def test_wall_and_channels_share_out_all_of_space(offsets: list[float], thicknes
         *regions_of(SHEET, L, thickness, None, TUBE).regions,
         *regions_of(CHANNELS, L, thickness, None, TUBE).regions,
     ]
-    counts = np.sum([region.holds(places, halves) for region in regions], axis=0)
+    counts = np.sum([region.contains(places, halves) for region in regions], axis=0)
     assert np.all((counts == 1) | (np.abs(places) == halves))
 
 
@@ -31,7 +31,7 @@ def test_labyrinths_of_complementary_densities_share_out_all_of_space(density: f
     a, b = regions_of(NETWORK_A, L, None, density, TUBE), regions_of(NETWORK_B, L, None, 1 - density, TUBE)
     places = np.linspace(-4, 4, 100)
     halves = [np.full(len(places), float(made.thickness) / 2) for made in (a, b)]  # type: ignore[arg-type]
-    held = [made.regions[0].holds(places, half) for made, half in zip((a, b), halves, strict=True)]
+    held = [made.regions[0].contains(places, half) for made, half in zip((a, b), halves, strict=True)]
     assert np.sum(held[0] == held[1]) <= 1
 
 
@@ -50,7 +50,7 @@ def test_faces_that_bound_a_region_look_out_of_it(kind: str) -> None:
             place = half * (2 * side - 1)
             outwards = -1.0 if backwards else 1.0
             beside = np.array([place - 1e-3 * outwards, place + 1e-3 * outwards])
-            assert region.holds(beside, np.full(2, half)).tolist() == [True, False]
+            assert region.contains(beside, np.full(2, half)).tolist() == [True, False]
 
 
 def test_the_bare_surface_is_one_face_without_a_wall() -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.trim.edge_crossings import AXES, PLANES, Faces, rim_crossings, square_points
+from gyroid_cad.trim.edge_crossings import AXES, PLANES, Faces, edge_crossings, square_points
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import Wall, build_wall
 
@@ -50,14 +50,18 @@ def test_crossings_lie_in_their_planes_and_both_faces_that_share_a_side_find_the
     level: float, side: int, rational: bool
 ) -> None:
     faces = cell_faces(level, side, rational)
-    rims = rim_crossings(faces)
-    points = faces.points(rims.face, *(x[:, np.newaxis] for x in square_points(rims.side, rims.along)))[:, 0]
-    assert points[np.arange(len(points)), AXES[rims.plane]] == pytest.approx(np.full(len(points), level), abs=1e-12)
+    crossings = edge_crossings(faces)
+    points = faces.points(crossings.face, *(x[:, np.newaxis] for x in square_points(crossings.side, crossings.along)))[
+        :, 0
+    ]
+    assert points[np.arange(len(points)), AXES[crossings.plane]] == pytest.approx(
+        np.full(len(points), level), abs=1e-12
+    )
     complex = wall(rational).complex
-    edges = complex.patch_edges[rims.face, rims.side]
+    edges = complex.patch_edges[crossings.face, crossings.side]
     for edge in np.flatnonzero(~complex.free):
         on_edge = edges == edge
-        first, second = (points[on_edge & (rims.face == face)] for face in complex.edge_patches[edge])
+        first, second = (points[on_edge & (crossings.face == face)] for face in complex.edge_patches[edge])
         assert len(first) == len(second)
         # The two run along it in opposite ways, or alike.
         assert min(np.abs(first - second).max(initial=0), np.abs(first - second[::-1]).max(initial=0)) < 1e-9 * L
@@ -67,10 +71,10 @@ def test_crossings_lie_in_their_planes_and_both_faces_that_share_a_side_find_the
 @given(levels, st.sampled_from([0, 1]))
 def test_curves_enter_a_face_as_often_as_they_leave_and_in_turn(level: float, side: int) -> None:
     faces = cell_faces(level, side)
-    rims = rim_crossings(faces)
+    crossings = edge_crossings(faces)
     for face in range(len(faces)):
         for plane in range(len(PLANES)):
-            entering = rims.entering[(rims.face == face) & (rims.plane == plane)]
+            entering = crossings.entering[(crossings.face == face) & (crossings.plane == plane)]
             assert np.all(entering != np.roll(entering, 1))
 
 
@@ -81,14 +85,14 @@ def test_a_side_that_dips_through_a_plane_crosses_it_twice_however_little(
     graph: Graph, depth: float, middle: float, sign: int
 ) -> None:
     faces = graph(lambda x, y: sign * ((x - middle) ** 2 + y), {4 if sign > 0 else 5: sign * (depth - 1)})
-    rims = rim_crossings(faces)
+    crossings = edge_crossings(faces)
     ends = [middle - np.sqrt(depth), middle + np.sqrt(depth)]
-    assert rims.along[rims.side == 0] == pytest.approx([end for end in ends if abs(end) < 1], abs=1e-7)
+    assert crossings.along[crossings.side == 0] == pytest.approx([end for end in ends if abs(end) < 1], abs=1e-7)
 
 
 @pytest.mark.parametrize("clear", [1e-3, 1e-5, 1e-9])
 def test_a_side_that_stays_clear_of_a_plane_does_not_cross_it(graph: Graph, clear: float) -> None:
-    assert len(rim_crossings(graph(lambda x, y: (x - 0.1) ** 2 + y, {4: -1 - clear})).face) == 0
+    assert len(edge_crossings(graph(lambda x, y: (x - 0.1) ** 2 + y, {4: -1 - clear})).face) == 0
 
 
 @pytest.mark.parametrize(
@@ -99,18 +103,18 @@ def test_a_plane_through_a_corner_is_refused_or_missed_by_all(
 ) -> None:
     faces = graph(lambda x, y: slopes[0] * x + slopes[1] * y, {4: level})
     try:
-        rims = rim_crossings(faces)
+        crossings = edge_crossings(faces)
     except KernelError:
         return
     # Without the very corner: an even number of crossings, none at the corner itself.
-    assert len(rims.face) % 2 == 0
-    assert np.all(np.abs(rims.along) < 1)
+    assert len(crossings.face) % 2 == 0
+    assert np.all(np.abs(crossings.along) < 1)
 
 
 def test_a_side_in_a_plane_is_refused_or_not_crossed(graph: Graph) -> None:
     with suppress(KernelError):
-        assert len(rim_crossings(graph(lambda x, y: 1 + y, {4: 0.0})).face) == 0
+        assert len(edge_crossings(graph(lambda x, y: 1 + y, {4: 0.0})).face) == 0
 
 
 def test_faces_far_from_all_planes_cross_none(graph: Graph) -> None:
-    assert len(rim_crossings(graph(lambda x, y: x * y, {})).face) == 0
+    assert len(edge_crossings(graph(lambda x, y: x * y, {})).face) == 0

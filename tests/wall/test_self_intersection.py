@@ -1,4 +1,4 @@
-"""Whether a wall that varies can exist: where it folds, where it meets another, and what would pass."""
+"""Whether a graded wall can exist: where it folds, where it meets another, and what would pass."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gyroid_cad.errors import SoundnessError
+from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import parse_map
 from gyroid_cad.maps.space import SpaceMap
@@ -23,11 +23,11 @@ from gyroid_cad.nurbs.surface import grid_derivatives
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, placed_corners
 from gyroid_cad.wall.complex import build_complex
-from gyroid_cad.wall.exact import laid_patches
+from gyroid_cad.wall.exact import offset_patches
 from gyroid_cad.wall.grading import THINNEST_WALL, Grading
 from gyroid_cad.wall.offset import Wall
-from gyroid_cad.wall.refit import fitted_wall
-from gyroid_cad.wall.self_intersection import require_sound, require_sound_fit
+from gyroid_cad.wall.refit import graded_wall
+from gyroid_cad.wall.self_intersection import require_simple, require_simple_fit
 
 TUBE = USUAL.tube
 
@@ -66,15 +66,15 @@ def graded(text: str, parameter: str = "thickness", **varied: Any) -> Graded:
     return lambda factor: Grading(L, **{parameter: field(f"{factor!r}*({text})")}, **varied)
 
 
-def refusal(grading: Grading, cells: Cells = ONE) -> SoundnessError | None:
+def refusal(grading: Grading, cells: Cells = ONE) -> SelfIntersectionError | None:
     try:
-        require_sound(build_complex(cells, closed=grading.closed), grading)
-    except SoundnessError as error:
+        require_simple(build_complex(cells, closed=grading.closed), grading)
+    except SelfIntersectionError as error:
         return error
     return None
 
 
-def refused(grading: Grading, cells: Cells = ONE) -> SoundnessError:
+def refused(grading: Grading, cells: Cells = ONE) -> SelfIntersectionError:
     error = refusal(grading, cells)
     assert error is not None
     return error
@@ -164,11 +164,11 @@ def test_a_wall_that_passes_through_the_next_is_refused() -> None:
 def pores(side: int) -> Iterator[tuple[Floats, float]]:
     """Flat points of one cell with the next wall on one side of the wall only: where, and how far away that is."""
     complex = build_complex(ONE)
-    ((_, laid),) = laid_patches(complex, Grading(L, 1.0), np.array([-1.0, 1]))
-    for point, normal in zip(laid.points, laid.normals, strict=True):
+    ((_, fitted),) = offset_patches(complex, Grading(L, 1.0), np.array([-1.0, 1]))
+    for point, normal in zip(fitted.points, fitted.normals, strict=True):
         # Flat points lie sqrt(3) L / 4 apart on their threefold axes, the wall across them.
         ahead, behind = (point + sign * sqrt(3) * L / 4 * normal for sign in (side, -side))
-        if all((np.abs(laid.points - p).max(axis=1) < 1e-9).any() == there for p, there in ((ahead, 1), (behind, 0))):
+        if all((np.abs(fitted.points - p).max(axis=1) < 1e-9).any() == there for p, there in ((ahead, 1), (behind, 0))):
             yield point, sqrt(3) * L / 4
 
 
@@ -181,8 +181,8 @@ def test_a_wall_that_grows_on_a_threefold_axis_is_limited_by_the_next_along_it(s
         x, y, z = point.tolist()
         bump = f"0.5 + 8*exp(-((x-{x})**2+(y-{y})**2+(z-{z})**2)/1.5)"
         halves = [0.25 + 4 * np.exp(-(distance**2) / 1.5) for distance in (0, pore)]
-        with pytest.raises(SoundnessError, match="where the wall meets the one opposite") as caught:
-            require_sound(complex, graded(bump)(1.0))
+        with pytest.raises(SelfIntersectionError, match="where the wall meets the one opposite") as caught:
+            require_simple(complex, graded(bump)(1.0))
         assert caught.value.place == pytest.approx((x, y, z))
         assert caught.value.limit / caught.value.value == pytest.approx(pore / sum(halves), rel=1e-9)
 
@@ -259,14 +259,14 @@ def test_a_wall_that_passes_does_not_fold_anywhere(spelling: str, part: float) -
     thickness = part * refused(Grading(L, 4.0, map=space)).limit
     grading = Grading(L, thickness, map=space)
     assert refusal(grading) is None
-    wall = fitted_wall(build_complex(ONE), grading, 16)
-    require_sound_fit(wall, grading)
+    wall = graded_wall(build_complex(ONE), grading, 16)
+    require_simple_fit(wall, grading)
     assert least_area(wall) > 0
 
 
 def test_what_folds_is_seen_to_fold() -> None:
     grading = Grading(L, 1.02 * TUBE.thickness_limit * L)
-    assert least_area(fitted_wall(build_complex(ONE), grading, 16)) < 0
+    assert least_area(graded_wall(build_complex(ONE), grading, 16)) < 0
 
 
 @pytest.mark.parametrize("parameter", ["thickness", "density"])
@@ -275,11 +275,11 @@ def test_a_fit_that_folds_before_the_exact_wall_is_refused_with_its_own_limit(pa
     error = refused(made(4 if parameter == "thickness" else 0.95))
     sound = made(error.limit * (1 - 1e-4))
     assert refusal(sound) is None
-    with pytest.raises(SoundnessError, match="where the fit with 8 control points a side folds over") as caught:
-        require_sound_fit(fitted_wall(complex, sound, 8), sound)
+    with pytest.raises(SelfIntersectionError, match="where the fit with 8 control points a side folds over") as caught:
+        require_simple_fit(graded_wall(complex, sound, 8), sound)
     assert caught.value.parameter == parameter
     assert caught.value.limit < error.limit
     passing, failing = (made(caught.value.limit * factor) for factor in (1 - 1e-6, 1 + 1e-6))
-    require_sound_fit(fitted_wall(complex, passing, 8), passing)
-    with pytest.raises(SoundnessError):
-        require_sound_fit(fitted_wall(complex, failing, 8), failing)
+    require_simple_fit(graded_wall(complex, passing, 8), passing)
+    with pytest.raises(SelfIntersectionError):
+        require_simple_fit(graded_wall(complex, failing, 8), failing)

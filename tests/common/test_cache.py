@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gyroid_cad.common.cache import Remembered
+from gyroid_cad.common.cache import Cache
 
 
-@given(asked=st.lists(st.integers(0, 5), max_size=30), most=st.integers(1, 4))
-def test_the_things_asked_for_last_are_held_and_no_others(asked: list[int], most: int) -> None:
-    store: Remembered[int, int] = Remembered(most)
+@given(requested=st.lists(st.integers(0, 5), max_size=30), most=st.integers(1, 4))
+def test_the_things_asked_for_last_are_held_and_no_others(requested: list[int], most: int) -> None:
+    store: Cache[int, int] = Cache(most)
     made: list[int] = []
-    for key in asked:
+    for key in requested:
         store.get(key, lambda key=key: made.append(key) or key)  # type: ignore[misc,func-returns-value]
-    last = list(dict.fromkeys(reversed(asked)))[:most]
+    last = list(dict.fromkeys(reversed(requested)))[:most]
     assert len(store) == len(last)
     before = len(made)
     for key in last:
@@ -24,7 +24,7 @@ def test_the_things_asked_for_last_are_held_and_no_others(asked: list[int], most
 
 
 def test_what_failed_is_not_held() -> None:
-    store: Remembered[str, float] = Remembered()
+    store: Cache[str, float] = Cache()
     with pytest.raises(ZeroDivisionError):
         store.get("a", lambda: 1 / 0)
     assert len(store) == 0

@@ -1,0 +1,102 @@
+"""Deviation of a fit from the exact surface, and the control points that a tolerance takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.surface.fit import (
+    CELL_SIZE,
+    DEGREE,
+    MOST_CONTROL_POINTS,
+    FitSettings,
+    FittedPatch,
+    edge_gap,
+    fit_patch,
+    more_control_points,
+)
+from gyroid_cad.surface.patch import PARAMETERISATIONS, parameter_corners
+from gyroid_cad.surface.weierstrass import GYROID, Family
+
+__all__ = ["FitReport", "fit_report", "fit_within"]
+
+_REPORT_SAMPLES_PER_SPAN = 8
+_MOST_REPORT_SAMPLES = 121
+_FOOT_POINT_STEPS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class FitReport:
+    """Errors of a fit; lengths in units of the cell size L, angles in degrees, curvature in 1/L."""
+
+    max_distance: float
+    rms_distance: float
+    max_normal_angle: float
+    max_mean_curvature: float
+    rms_mean_curvature: float
+    edge_gap: float
+    corner_error: float
+
+
+@lru_cache(maxsize=32)
+def fit_report(fitted: FittedPatch) -> FitReport:
+    """Measure a fit against the exact surface on a dense grid.
+
+    Distance is measured along the exact normal through the exact point, to where that line meets the
+    fitted surface (Newton's method); the angle is that between the two normals there.
+    """
+    n = fitted.settings.control_points
+    samples = np.linspace(-1, 1, min(_REPORT_SAMPLES_PER_SPAN * (n - DEGREE) + 1, _MOST_REPORT_SAMPLES))
+    u, v = (grid.ravel() for grid in np.meshgrid(samples, samples, indexing="ij"))
+    exact = PARAMETERISATIONS[fitted.settings.parameterisation]
+    points, normals = exact(u, v, fitted.family)
+    distance = np.zeros(len(u))
+    foot_u, foot_v = u.copy(), v.copy()
+    for _ in range(_FOOT_POINT_STEPS):
+        d = fitted.surface.derivatives(foot_u, foot_v)
+        residual = points + distance[:, np.newaxis] * normals - d[0, 0]
+        jacobian = np.stack([d[1, 0], d[0, 1], -normals], axis=-1)
+        step = np.linalg.solve(jacobian, residual[..., np.newaxis])[..., 0]
+        foot_u, foot_v, distance = foot_u + step[:, 0], foot_v + step[:, 1], distance + step[:, 2]
+        # Newton's steps square: after one this small nothing is left to gain.
+        if np.max(np.abs(step)) < 1e-8:
+            break
+    sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
+    curvature = fitted.surface.mean_curvature(samples[:, np.newaxis], samples[np.newaxis]) * CELL_SIZE
+    corner_u, corner_v = parameter_corners().T
+    off_corners = fitted.surface.evaluate(corner_u, corner_v) - exact(corner_u, corner_v, fitted.family)[0]
+    return FitReport(
+        max_distance=float(np.max(np.abs(distance))) / CELL_SIZE,
+        rms_distance=float(np.sqrt(np.mean(distance**2))) / CELL_SIZE,
+        max_normal_angle=float(np.degrees(np.arcsin(np.max(sine)))),
+        max_mean_curvature=float(np.max(np.abs(curvature))),
+        rms_mean_curvature=float(np.sqrt(np.mean(curvature**2))),
+        edge_gap=edge_gap(fitted),
+        corner_error=float(np.max(np.linalg.norm(off_corners, axis=1)) / CELL_SIZE),
+    )
+
+
+def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID) -> FitSettings:
+    """Raise the control points of settings until a tolerance is met.
+
+    Parameters
+    ----------
+    settings : FitSettings
+    tolerance : float
+        Largest deviation of the mid-surface, in cell sizes.
+    family : Family
+
+    Raises
+    ------
+    ParameterError
+        If it is out of reach, or the settings' own knots and weights miss it.
+    """
+    while (reached := fit_report(fit_patch(settings, family)).max_distance) > tolerance:
+        n = settings.control_points
+        if n == MOST_CONTROL_POINTS or not settings.plain:
+            raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
+        settings = replace(settings, control_points=more_control_points(n, reached / tolerance))
+    return settings

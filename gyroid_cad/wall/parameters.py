@@ -1,0 +1,220 @@
+"""Parameters of a lattice: checked when they are given, and turned into what is to be built."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import prod
+from typing import Self
+
+from numpy.typing import ArrayLike
+
+from gyroid_cad.common.checks import finite_number, positive_number
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.field import Field, FieldLike, as_field
+from gyroid_cad.fields.makers import paper_units
+from gyroid_cad.maps.block import as_map, space_over
+from gyroid_cad.maps.space import BlockMap
+from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
+from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.surface.fit_report import fit_within
+from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
+from gyroid_cad.wall.fitted import LatticeSpec
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.limits import (
+    require_cell_size,
+    require_density,
+    require_one,
+    require_thickness,
+    valid_tolerance,
+    whole_cells,
+)
+
+__all__ = ["USUAL_TOLERANCE", "LatticeParameters", "MapLike"]
+
+MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
+
+# Of a graded lattice, in cell sizes.
+USUAL_TOLERANCE = 1e-4
+BOX = "box"
+_FIELDS = {
+    "thickness": "a length in mm",
+    "density": "a volume fraction",
+    "scale_field": "a factor without unit",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeParameters:
+    """The parameters of :class:`gyroid_cad.Lattice`, which tells of each, and what follows from them alone."""
+
+    cells: tuple[int, int, int]
+    cell_size: float
+    thickness: FieldLike | None = None
+    density: FieldLike | None = None
+    fit: FitSettings = field(default_factory=FitSettings)
+    scale_field: FieldLike | None = None
+    map: MapLike | None = None
+    tolerance: float | None = None
+    trim: str | None = None
+    surface: str = USUAL.name
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cells", whole_cells(self.cells))
+        object.__setattr__(
+            self, "cell_size", finite_number("cell_size", self.cell_size, "a length in mm, a finite number")
+        )
+        require_cell_size(self.cell_size)
+        require_one(self.thickness, self.density)
+        for name, meaning in _FIELDS.items():
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
+        if self.map is not None:
+            object.__setattr__(self, "map", as_map(self.map))
+        surface_named(self.surface)
+        self._require_fit()
+        self._require_trim()
+        if not self.uniform:
+            self._require_variable()
+        elif self.density is None:
+            require_thickness(self.wall_thickness, self.cell_size, self.minimal_surface.tube)
+        else:
+            require_density(self.volume_fraction, self.cell_size, self.minimal_surface.tube)
+
+    @classmethod
+    def paper(
+        cls,
+        cells: tuple[int, int, int],
+        thickness_factor: FieldLike,
+        bc_length: FieldLike = 1.0,
+        scale: float = 1.0,
+        fit: FitSettings | None = None,
+        tolerance: float | None = None,
+        surface: str = USUAL.name,
+    ) -> Self:
+        """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
+
+        Parameters
+        ----------
+        cells : tuple of int
+            Number of cubic cells along x, y, z; each is two bounding cells long.
+        thickness_factor : number or field
+            Whole wall in BC units, of places in BC units before they are moved.
+        bc_length : number or field
+            In BC units: a place p is moved to bc_length(p) p.
+        scale : float
+            Millimetres per unit of BC length.
+        fit, tolerance, surface
+            As of :class:`Lattice`.
+
+        Raises
+        ------
+        ParameterError
+        """
+        given = paper_units(thickness_factor, bc_length, scale)
+        return cls(
+            cells,
+            given.cell_size,
+            given.thickness,
+            fit=fit or FitSettings(),
+            scale_field=given.scale_field,
+            tolerance=tolerance,
+            surface=surface,
+        )
+
+    @property
+    def minimal_surface(self) -> MinimalSurface:
+        """The surface of that name, from the table of families."""
+        return surface_named(self.surface)
+
+    @property
+    def uniform(self) -> bool:
+        """True where every cell is like every other."""
+        varying = isinstance(self.thickness, Field) or isinstance(self.density, Field)
+        return not varying and self.scale_field is None and self.map is None
+
+    @property
+    def wall_thickness(self) -> float:
+        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice is graded."""
+        if not self.uniform:
+            return self._measures().mean_thickness
+        if self.density is None:
+            return float(self.thickness)  # type: ignore[arg-type]
+        return self.minimal_surface.tube.thickness(self.density) * self.cell_size  # type: ignore[arg-type]
+
+    @property
+    def volume_fraction(self) -> float:
+        """The density, whichever of thickness and density was given; the whole block's where the lattice is graded."""
+        if not self.uniform:
+            return self.exact_volume / block_volume(self.cells, self.grading())
+        if self.density is None:
+            return self.minimal_surface.tube.density(self.wall_thickness / self.cell_size)
+        return float(self.density)  # type: ignore[arg-type]
+
+    @property
+    def exact_volume(self) -> float:
+        """Volume in mm3 of the exact lattice, by the tube formula, or by quadrature where it varies."""
+        if not self.uniform:
+            return self._measures().volume
+        return prod(self.cells) * self.volume_fraction * self.cell_size**3
+
+    def spec(self) -> LatticeSpec:
+        """Return what is to be built."""
+        settings = self.fit
+        if self.uniform and self.tolerance is not None:
+            settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
+        tolerance = self.tolerance or USUAL_TOLERANCE
+        return LatticeSpec(self.cells, self.grading(), settings, tolerance, self.trim == BOX)
+
+    def grading(self) -> Grading:
+        """Return how wall and space vary, or that they do not."""
+        if self.uniform:
+            return Grading(self.cell_size, self.wall_thickness, surface=self.minimal_surface)
+        space = None if self.map is None else space_over(self.map, self.cells, self.cell_size)  # type: ignore[arg-type]
+        return Grading(
+            self.cell_size,
+            self.thickness,  # type: ignore[arg-type]
+            self.density,  # type: ignore[arg-type]
+            self.scale_field,  # type: ignore[arg-type]
+            space,
+            self.minimal_surface,
+        )
+
+    def _measures(self) -> ExactMeasures:
+        return _measures(self.cells, self.grading())
+
+    def _require_variable(self) -> None:
+        """Check a graded lattice as far as can be before it is built."""
+        for name in ("thickness", "scale_field"):
+            if isinstance(value := getattr(self, name), float):
+                positive_number(name, value)
+        if isinstance(self.density, float):
+            require_density(self.density, self.cell_size, self.minimal_surface.tube)
+        if self.scale_field is not None and any(self.grading().map_closes):
+            raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
+
+    def _require_trim(self) -> None:
+        if self.trim not in (None, BOX):
+            raise ParameterError("trim", self.trim, f"{BOX}, or none for whole patches")
+        if self.trim and (self.scale_field is not None or self.map is not None):
+            raise ParameterError("trim", self.trim, "none where a map or a scale field carries the block elsewhere")
+
+    def _require_fit(self) -> None:
+        if not isinstance(self.fit, FitSettings):
+            raise ParameterError("fit", self.fit, "a FitSettings")
+        if not self.uniform and not self.fit.plain:
+            raise ParameterError(
+                "fit",
+                self.fit,
+                "evenly spaced knots, equal weights and the smooth parameterisation where the lattice is graded: "
+                "there the number of control points rises with the tolerance",
+            )
+        if self.tolerance is not None:
+            object.__setattr__(self, "tolerance", valid_tolerance(self.tolerance))
+
+
+@lru_cache(maxsize=16)
+def _measures(cells: tuple[int, int, int], grading: Grading) -> ExactMeasures:
+    return exact_measures(build_complex(cells, grading.surface.cell, grading.closed), grading)

@@ -14,11 +14,11 @@ from typing import Any
 from build123d import Align, BasePartObject, BuildPart, Compound, Location, Mode, Part, RotationLike
 from build123d.geometry import to_align_offset
 
+from gyroid_cad.common.choices import Kind, SurfaceName, Trim
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
-from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 
 __all__ = ["Gyroid", "GyroidFill"]
@@ -60,8 +60,8 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         scale_field: FieldLike | None = None,
         map: MapLike | None = None,
         tolerance: float | None = None,
-        trim: str | None = None,
-        surface: str = USUAL.name,
+        trim: Trim | None = None,
+        surface: SurfaceName = "gyroid",
     ) -> None:
         self.lattice = Lattice(
             cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim, surface
@@ -105,7 +105,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         cell_size: float | None = None,
         thickness: FieldLike | None = None,
         density: FieldLike | None = None,
-        kind: str = "sheet",
+        kind: Kind = "sheet",
         *,
         skin: float | None = None,
         openings: Sequence[Any] = (),

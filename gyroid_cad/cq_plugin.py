@@ -12,11 +12,11 @@ from typing import Any
 
 import cadquery as cq
 
+from gyroid_cad.common.choices import Kind, SurfaceName, Trim
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
-from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 
 __all__ = ["gyroid", "gyroid_fill"]
@@ -36,8 +36,8 @@ def gyroid(
     scale_field: FieldLike | None = None,
     map: MapLike | None = None,
     tolerance: float | None = None,
-    trim: str | None = None,
-    surface: str = USUAL.name,
+    trim: Trim | None = None,
+    surface: SurfaceName = "gyroid",
 ) -> cq.Workplane:
     """A lattice of the gyroid, or of another surface, at each point of the stack.
 
@@ -79,7 +79,7 @@ def gyroid_fill(
     cell_size: float | None = None,
     thickness: FieldLike | None = None,
     density: FieldLike | None = None,
-    kind: str = "sheet",
+    kind: Kind = "sheet",
     *,
     skin: float | None = None,
     **settings: Any,

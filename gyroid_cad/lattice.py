@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import prod
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
@@ -15,7 +14,8 @@ from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
+from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
@@ -135,7 +135,7 @@ class Lattice(LatticeParameters):
     def write(
         self,
         *paths: str | os.PathLike[str],
-        schema: str = "ap214",
+        schema: Schema = "ap214",
         deviation: float | None = None,
         angle: float = 15.0,
         progress: Progress | None = None,
@@ -209,8 +209,7 @@ class Lattice(LatticeParameters):
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
         """Tell whether files with these endings need the solid: triangles of whole patches do not."""
-        formats = {FORMATS[Path(path).suffix.lower()] for path in paths}
-        return bool(self.trim) or not formats <= set(TRIANGLE_FORMATS)
+        return bool(self.trim) or any(format_of(path) not in TRIANGLE_FORMATS for path in paths)
 
     def triangles(self, deviation: float | None = None, progress: Progress | None = None) -> Triangles:
         """The triangles behind STL and 3MF files of whole patches; no kernel is asked.

@@ -13,8 +13,6 @@ from typing import Any
 
 import griffe
 
-from gyroid_cad.surface.families import USUAL
-
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr|data|exc):`(~?)([\w.]+)`")
 _SECTIONS = ("Parameters", "Attributes", "Raises")
 _NAMES = re.compile(r"\*{0,2}\w+(, \*{0,2}\w+)+")
@@ -29,20 +27,6 @@ class Docstrings(griffe.Extension):
         if obj.docstring is not None:
             text = "\n".join(_apart(obj.docstring.value.split("\n")))
             obj.docstring.value = _ROLE.sub(lambda role: _reference(obj, *role.groups()), text)
-
-    def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
-        """Of a dataclass, whose fields become parameters."""
-        attr.value = _said(attr.value)
-
-    def on_function(self, *, func: griffe.Function, **_: Any) -> None:
-        """Of what a function's parameters are if left out."""
-        for parameter in func.parameters:
-            parameter.default = _said(parameter.default)
-
-
-def _said(value: Any) -> Any:
-    """The usual surface by its name, which means more to a reader than the constant that holds it."""
-    return repr(USUAL.name) if str(value) == "USUAL.name" else value
 
 
 def _apart(lines: list[str]) -> Iterator[str]:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
-from gyroid_cad.common.formats import FORMATS
+from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.formats import STEP, require_format
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import KernelError, ParameterError
@@ -77,7 +78,7 @@ class Assembly:
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
         return NamedPart(solid, PART_NAME, GREEN, faces)
 
-    def write(self, targets: Sequence[Path], schema: str = "ap214", progress: Progress | None = None) -> None:
+    def write(self, targets: Sequence[Path], schema: Schema = "ap214", progress: Progress | None = None) -> None:
         """Write STEP assemblies.
 
         Raises
@@ -196,7 +197,5 @@ def require_assembly_formats(targets: Sequence[Path]) -> None:
     ------
     ParameterError
     """
-    endings = [ending for ending, form in FORMATS.items() if form == "step"]
     for path in targets:
-        if path.suffix.lower() not in endings:
-            raise ParameterError("output", str(path), f"a name ending in {' or '.join(endings)} for an assembly")
+        require_format("output", path, [STEP], "an assembly: a file name ending in ")

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import FORMATS, require_meshing, require_schema
+from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.formats import BREP, STEP, STL, format_of, require_meshing, require_schema
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
@@ -136,7 +137,7 @@ class Build:
         return self._valid
 
     def write(
-        self, targets: Sequence[Path], schema: str, deviation: float, angle: float, progress: Progress | None = None
+        self, targets: Sequence[Path], schema: Schema, deviation: float, angle: float, progress: Progress | None = None
     ) -> None:
         """Write the solid to each target in the format of its ending.
 
@@ -169,7 +170,9 @@ class Build:
             )
 
 
-def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, angle: float, cut: bool = False) -> None:
+def write_shape(
+    shape: KernelShape, path: Path, schema: Schema, deviation: float, angle: float, cut: bool = False
+) -> None:
     """Write a shape, whose faces may have been cut, in the format of the path's ending.
 
     Raises
@@ -181,15 +184,15 @@ def write_shape(shape: KernelShape, path: Path, schema: str, deviation: float, a
     from gyroid_cad.kernel.stl import meshed, write_stl
     from gyroid_cad.mesh.triangles.three_mf import write_3mf
 
-    match FORMATS[path.suffix.lower()]:
-        case "step":
-            write_step(shape, path, schema, parameter_curves=cut)
-        case "brep":
-            write_brep(shape, path)
-        case "stl":
-            write_stl(shape, path, deviation, angle)
-        case _:
-            write_3mf(*meshed(shape, path, deviation, angle), path)
+    form = format_of(path)
+    if form is STEP:
+        write_step(shape, path, schema, parameter_curves=cut)
+    elif form is BREP:
+        write_brep(shape, path)
+    elif form is STL:
+        write_stl(shape, path, deviation, angle)
+    else:
+        write_3mf(*meshed(shape, path, deviation, angle), path)
 
 
 _builds: Cache[LatticeSpec, Build] = Cache()
@@ -222,7 +225,7 @@ def build(spec: LatticeSpec, progress: Progress | None = None) -> Build:
 
 
 def require_settings(
-    cells: tuple[int, int, int], schema: str, deviation: float | None, angle: float, solid: bool = True
+    cells: tuple[int, int, int], schema: Schema, deviation: float | None, angle: float, solid: bool = True
 ) -> None:
     """Check the settings of files to be written, and that memory will do, before anything is built.
 

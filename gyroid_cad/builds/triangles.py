@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import FORMATS
+from gyroid_cad.common.formats import THREE_MF, format_of
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
@@ -51,13 +51,13 @@ class Triangles:
             If a file cannot count so many triangles, or memory would not do for 3MF.
         ExportError
         """
-        if any(FORMATS[path.suffix.lower()] == "3mf" for path in targets):
+        if any(format_of(path) is THREE_MF for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count
             require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)), kernel=False)
         for path in targets:
             stage = f"write {path.name}"
-            if FORMATS[path.suffix.lower()] == "3mf":
+            if format_of(path) is THREE_MF:
                 with timed(self.seconds, stage, progress):
                     write_3mf(*indexed_triangles(self.triangulation), path)
             else:

@@ -18,10 +18,20 @@ from gyroid_cad.cli.fill import fill_command
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, printed_options
 from gyroid_cad.cli.mesh import mesh_command, volumes_command
 from gyroid_cad.cli.messages import BAD_USAGE, Session, debug_option, failed
+from gyroid_cad.cli.options import (
+    angle_option,
+    deviation_option,
+    json_option,
+    output_option,
+    printer_option,
+    quiet_option,
+    schema_option,
+)
 from gyroid_cad.cli.print_check import print_check_command
 from gyroid_cad.cli.report import report_command
 from gyroid_cad.cli.view import view_command
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
@@ -46,41 +56,23 @@ def commands() -> None:
 
 
 @commands.command()
-@click.option(
-    "-o",
-    "--output",
-    multiple=True,
-    metavar="FILE",
-    help=".step, .stp, .brep, .stl or .3mf; may be repeated. For .stl and .3mf of whole patches no solid is built.",
+@output_option(
+    f"{listed_endings(PART_FORMATS)}; may be repeated. For .stl and .3mf of whole patches no solid is built."
 )
 @lattice_options
-@click.option(
-    "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
-)
+@schema_option
 @click.option(
     "--instances",
     is_flag=True,
     help="Write .step as an assembly: one cell and its places, named and coloured. Hundreds of times smaller, to look "
     "at and lay out; the cells touch and are not fused. Of cells that are all alike and not trimmed.",
 )
-@click.option(
-    "--deviation",
-    type=float,
-    metavar="MM",
-    help="Of the triangles in .stl and .3mf; a thousandth of the cell size if left out, or a tenth of a thin wall.",
-)
-@click.option(
-    "--angle",
-    type=float,
-    default=15.0,
-    show_default=True,
-    metavar="DEGREES",
-    help="Between triangles of a lattice cut with --trim; those of whole patches keep to the deviation alone.",
-)
-@click.option("--printer", metavar="NAME|FILE.toml", help="Check as well whether it can make this, such as form2.")
+@deviation_option
+@angle_option
+@printer_option("Check as well whether it can make this, such as form2.")
 @click.option("--print-config", is_flag=True, help="Print the lattice as TOML, ready for LATTICE.toml; build nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+@json_option
+@quiet_option
 def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     """Build a lattice as a closed solid, or as triangles, and write it.
 
@@ -144,7 +136,7 @@ for _command in (
 @click.option(
     "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of our fit, along a side."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+@json_option
 def fit_report_command(control_points: int, as_json: bool) -> None:
     """Compare our fit of the patch with the paper's, side by side.
 

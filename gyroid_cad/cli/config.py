@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,11 @@ def printed_config(values: Mapping[str, Any]) -> str:
 
 
 def _number_or_text(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
     try:
-        return float(value) if isinstance(value, str) else value
+        number = float(value)
     except ValueError:
         return value
+    # Words such as "NAN" are text that happens to be read as a number, and stay what they are.
+    return number if isfinite(number) else value

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from gyroid_cad.cli.console import print_doctor
+from gyroid_cad.cli.options import json_option
 from gyroid_cad.version import __version__
 
 __all__ = ["doctor_command", "version_option"]
@@ -36,7 +37,7 @@ def version_option(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command("doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+@json_option
 @click.pass_context
 def doctor_command(context: click.Context, as_json: bool) -> None:
     """Say what is installed, and build, write and read one cell to see whether it works.

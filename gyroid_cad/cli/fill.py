@@ -10,22 +10,26 @@ from typing import Any
 import click
 
 from gyroid_cad.cli.console import print_fill, shown_progress
-from gyroid_cad.cli.lattice_options import chosen_surface, surface_option
+from gyroid_cad.cli.lattice_options import density_of, porosity_option, require_one_wall, surface_option
+from gyroid_cad.cli.options import (
+    angle_option,
+    deviation_option,
+    file_paths,
+    json_option,
+    output_option,
+    quiet_option,
+    schema_option,
+)
+from gyroid_cad.common.choices import KINDS, Schema
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 __all__ = ["fill_command"]
 
 
 @click.command("fill")
-@click.argument("part", metavar="PART.step")
-@click.option(
-    "-o",
-    "--output",
-    multiple=True,
-    required=True,
-    metavar="FILE",
-    help=".step, .stp, .brep, .stl or .3mf; may be repeated.",
-)
+@click.argument("part", metavar="PART.step", shell_complete=file_paths)
+@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.", required=True)
 @surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(
@@ -36,6 +40,7 @@ __all__ = ["fill_command"]
 @click.option(
     "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a network."
 )
+@porosity_option
 @click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
 @click.option(
     "--opening",
@@ -47,7 +52,7 @@ __all__ = ["fill_command"]
 )
 @click.option(
     "--kind",
-    type=click.Choice(["sheet", "network-a", "network-b", "channels", "surface"]),
+    type=click.Choice(KINDS),
     default="sheet",
     show_default=True,
     help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone.",
@@ -59,22 +64,19 @@ __all__ = ["fill_command"]
 )
 @click.option("--drop-islands", is_flag=True, help="Leave out pieces cut off from the largest one.")
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
-@click.option(
-    "--schema", type=click.Choice(["ap214", "ap242"]), default="ap214", show_default=True, help="Of STEP files."
-)
-@click.option("--deviation", type=float, metavar="MM", help="Of the triangles in .stl and .3mf.")
-@click.option("--angle", type=float, default=15.0, show_default=True, metavar="DEGREES", help="Between triangles.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+@schema_option
+@deviation_option
+@angle_option
+@json_option
+@quiet_option
 def fill_command(
     part: str,
     output: tuple[str, ...],
     control_points: int,
-    schema: str,
+    schema: Schema,
     deviation: float | None,
     angle: float,
     openings: tuple[str, ...],
-    surface: str | None,
     as_json: bool,
     quiet: bool,
     **given: Any,
@@ -92,12 +94,15 @@ def fill_command(
     from gyroid_cad.filling.fill import fill
     from gyroid_cad.surface.fit import FitSettings
 
+    if given["kind"] != "surface":
+        require_one_wall(given)
     require_formats(output)
     require_settings((1, 1, 1), schema, deviation, angle)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         faces = [_face(opening) for opening in openings]
-        settings = {**given, **chosen_surface(surface)}
-        filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **settings)
+        given["density"] = density_of(given)
+        del given["porosity"]
+        filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
         filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gyroid_cad.cli.messages import label, remember_config
+from gyroid_cad.cli.options import file_paths
+from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS, FitName
+from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -15,17 +18,19 @@ if TYPE_CHECKING:
     from gyroid_cad.lattice import Lattice
 
 __all__ = [
-    "chosen_surface",
+    "density_of",
     "lattice_of",
     "lattice_options",
     "lattice_options_beside",
     "options_given",
+    "porosity_option",
     "printed_options",
+    "require_one_wall",
     "surface_option",
 ]
 
-_CONFIG_ENDING = ".toml"
-_OWN_OPTIONS = ("thickness", "density", "scale_field")
+_WALL_OPTIONS = ("thickness", "density", "porosity")
+_OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map", "trim")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
@@ -37,7 +42,7 @@ _WRITTEN, _READ = ("output", "histogram", "screenshot"), ("printer",)
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
     """Put a file's values in the place of defaults, so that options on the command line override them."""
-    if path is not None and path.lower().endswith(_CONFIG_ENDING):
+    if path is not None and format_of(path) is TOML:
         from gyroid_cad.cli.config import read_config
 
         options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
@@ -59,7 +64,7 @@ def _default(context: click.Context, config: Config, key: str, multiple: bool) -
         if key in _WRITTEN:
             parts = [config.output(key, part, context.params["allow_outside"]) for part in parts]
         elif key in _READ:
-            parts = [config.beside(part) if part.lower().endswith(_CONFIG_ENDING) else part for part in parts]
+            parts = [config.beside(part) if format_of(part) is TOML else part for part in parts]
         return parts if multiple or not isinstance(given, str) else parts[0]
 
     return value
@@ -74,19 +79,15 @@ def printed_options() -> str:
     return printed_config({name: context.params[name] for name in keys if name not in _NO_KEYS})
 
 
-def _known_surfaces(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Names that a shell may complete a surface to."""
-    from gyroid_cad.surface.families import SURFACES
-
-    return [name for name in SURFACES if name.startswith(incomplete)]
-
-
-# Which surfaces there are is for the table of families to say; it is not read for --help alone.
 surface_option = click.option(
     "--surface",
-    metavar="NAME",
-    shell_complete=_known_surfaces,
-    help="gyroid, diamond or primitive; gyroid if left out.",
+    type=click.Choice(SURFACE_NAMES),
+    default="gyroid",
+    show_default=True,
+    help="The minimal surface that the wall follows.",
+)
+porosity_option = click.option(
+    "--porosity", metavar="P", help="Empty part of the volume instead: 1 - density; may be an expression too."
 )
 _OPTIONS = (
     surface_option,
@@ -104,6 +105,7 @@ _OPTIONS = (
         metavar="RHO",
         help="Volume fraction instead of thickness, below 0.94033; may be an expression too.",
     ),
+    porosity_option,
     click.option(
         "--scale-field",
         metavar="EXPRESSION",
@@ -121,7 +123,7 @@ _OPTIONS = (
     click.option("--bc-length", metavar="B", help="The paper's: length of a bounding cell, instead of --cell-size."),
     click.option("--scale", type=float, metavar="MM", help="Millimetres per unit of BC length; 1 if left out."),
     click.option(
-        "--trim", metavar="SHAPE", help="box: cut to the block of cells, flat sides instead of whole patches."
+        "--trim", type=click.Choice(TRIMS), help="Cut to the block of cells: flat sides instead of whole patches."
     ),
     click.option(
         "--tolerance",
@@ -139,7 +141,7 @@ _OPTIONS = (
     ),
     click.option(
         "--fit",
-        type=click.Choice(["smooth", "paper"]),
+        type=click.Choice(FITS),
         default="smooth",
         show_default=True,
         help="The paper's own leaves gaps between patches, and is refused with their size.",
@@ -166,7 +168,12 @@ def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callab
         )
         function = outside(function)
         argument = click.argument(
-            "config", required=False, metavar=f"[{files}]", is_eager=True, callback=_defaults_from_file
+            "config",
+            required=False,
+            metavar=f"[{files}]",
+            is_eager=True,
+            callback=_defaults_from_file,
+            shell_complete=file_paths,
         )
         return argument(function)
 
@@ -180,11 +187,6 @@ def options_given(but: Collection[str]) -> list[str]:
     return [label(context, name) for name in named]
 
 
-def chosen_surface(name: str | None) -> dict[str, Any]:
-    """The keyword for a surface, or none where none was asked for."""
-    return {} if name is None else {"surface": name}
-
-
 def lattice_of(given: dict[str, Any]) -> Lattice:
     """The lattice that the options describe, in millimetres or in the paper's units.
 
@@ -194,28 +196,56 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     """
     from gyroid_cad.lattice import Lattice
 
-    if given["config"] is not None and not given["config"].lower().endswith(_CONFIG_ENDING):
-        raise click.UsageError(
-            f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in {_CONFIG_ENDING}."
-        )
+    if given["config"] is not None and format_of(given["config"]) is not TOML:
+        raise click.UsageError(f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in .toml.")
     fit = _fit_settings(given["fit"], given["control_points"])
     _require_given(given, "cells")
-    surface = chosen_surface(given["surface"])
     if any(given[name] is not None for name in _PAPER_OPTIONS):
-        own = (*_OWN_OPTIONS, "cell_size", "map", "trim")
-        mixed = [name for name in own if given[name] is not None]
+        mixed = [name for name in _OWN_OPTIONS if given[name] is not None]
         if mixed or given["thickness_factor"] is None:
             raise click.UsageError(
                 f"{_listed(_PAPER_OPTIONS)} are the paper's units: they need {_listed(_PAPER_OPTIONS[:1])}, and not "
-                f"{_listed(mixed or own)}"
+                f"{_listed(mixed or _OWN_OPTIONS)}"
             )
         units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
-        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], **surface)
+        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
     _require_given(given, "cell_size")
-    if (given["thickness"] is None) == (given["density"] is None):
-        raise click.UsageError(f"give exactly one of {_listed(_OWN_OPTIONS[:2], ' and ')}")
-    own_options = {name: given[name] for name in (*_OWN_OPTIONS, "map", "tolerance", "trim")}
-    return Lattice(given["cells"], given["cell_size"], **own_options, **surface, fit=fit)
+    require_one_wall(given)
+    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "trim", "surface")}
+    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, fit=fit)
+
+
+def require_one_wall(given: dict[str, Any]) -> None:
+    """Refuse a wall that is described twice, or not at all.
+
+    Raises
+    ------
+    click.UsageError
+    """
+    named = [name for name in _WALL_OPTIONS if given[name] is not None]
+    if len(named) != 1:
+        raise click.UsageError(f"give exactly one of {_listed(named or _WALL_OPTIONS)}")
+
+
+def density_of(given: dict[str, Any]) -> Any:
+    """The density, whichever of it and the porosity was given; None if neither was.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if given["porosity"] is None:
+        return given["density"]
+    from gyroid_cad.fields.field import as_field
+    from gyroid_cad.wall.limits import percent_hint
+
+    porosity = as_field("porosity", given["porosity"], "a volume fraction")
+    if not isinstance(porosity, float):
+        return 1 - porosity
+    if not 0 < porosity < 1:
+        raise ParameterError("porosity", porosity, "above 0 and below 1" + percent_hint(porosity))
+    # So that 0.7 is the density 0.3, to the last bit.
+    return round(1 - porosity, 15)
 
 
 def _require_given(given: dict[str, Any], name: str) -> None:
@@ -229,7 +259,7 @@ def _listed(names: Collection[str], between: str = ", ") -> str:
     return between.join(label(context, name) for name in names)
 
 
-def _fit_settings(fit: str, control_points: int) -> Any:
+def _fit_settings(fit: FitName, control_points: int) -> Any:
     from gyroid_cad.surface.fit import FitSettings
 
     if fit == "smooth":

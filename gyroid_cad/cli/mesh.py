@@ -11,20 +11,16 @@ import click
 
 from gyroid_cad.cli.console import print_mesh, print_table, print_volumes, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options
+from gyroid_cad.cli.options import json_option, one_of, output_option, quiet_option
 from gyroid_cad.common.files import file_sizes, require_distinct
+from gyroid_cad.common.formats import MESH_FORMATS, VOLUME_FORMATS, listed_formats, require_formats
 from gyroid_cad.common.progress import timed
 
 __all__ = ["mesh_command", "volumes_command"]
 
 
 @click.command("mesh")
-@click.option(
-    "-o",
-    "--output",
-    multiple=True,
-    metavar="FILE",
-    help=".vtu, .msh (Gmsh), .inp (Abaqus, CalculiX), .cdb (ANSYS), .bdf or .nas (NASTRAN); may be repeated.",
-)
+@output_option(f"{listed_formats(MESH_FORMATS)}; may be repeated.")
 @lattice_options
 @click.option(
     "--subdivisions", type=int, metavar="N", help="Elements along each side of a patch, of 24 a gyroid's cell."
@@ -37,12 +33,20 @@ __all__ = ["mesh_command", "volumes_command"]
     metavar="M",
     help="Of hexahedra across the wall; 0 for quadrilaterals of the mid-surface.",
 )
-@click.option("--order", type=int, default=1, show_default=True, metavar="1|2", help="Linear or quadratic elements.")
+@click.option(
+    "--order",
+    type=int,
+    default=1,
+    show_default=True,
+    metavar="1|2",
+    shell_complete=one_of("1", "2"),
+    help="Linear or quadratic elements.",
+)
 @click.option("--full", is_flag=True, help="Quadratic hexahedra of 27 nodes instead of 20, quadrilaterals of 9 not 8.")
 @click.option("--quality", is_flag=True, help="Measure every element, as Verdict defines the measures.")
 @click.option("--histogram", metavar="FILE.png", help="Draw the measures' histograms; needs matplotlib.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+@json_option
+@quiet_option
 def mesh_command(
     output: tuple[str, ...],
     subdivisions: int | None,
@@ -122,17 +126,19 @@ def mesh_command(
 
 
 @click.command("volumes")
-@click.option(
-    "-o",
-    "--output",
-    multiple=True,
-    metavar="FILE",
-    help=".mesh (MFEM NURBS mesh v1.0), .xml (G+Smo multipatch), .json or .npz; may be repeated.",
-)
+@output_option(f"{listed_formats(VOLUME_FORMATS)}; may be repeated.")
 @lattice_options
-@click.option("--degree", type=int, default=1, show_default=True, metavar="1|3", help="Across the wall; 3 along it.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
-@click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+@click.option(
+    "--degree",
+    type=int,
+    default=1,
+    show_default=True,
+    metavar="1|3",
+    shell_complete=one_of("1", "3"),
+    help="Across the wall; 3 along it.",
+)
+@json_option
+@quiet_option
 def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: bool, **given: Any) -> None:
     """Write a lattice as conforming trivariate NURBS patches, for isogeometric analysis.
 
@@ -142,12 +148,12 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
     gyroid-cad volumes -o cell.mesh -o cell.xml --cells 1 1 1 --cell-size 10 --density 0.3 --degree 3
     """
     start = time.perf_counter()
-    from gyroid_cad.mesh.iga.files import require_volume_file, write_volumes
+    from gyroid_cad.mesh.iga.files import write_volumes
 
     lattice = lattice_of(given)
     if not output:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    targets = require_distinct(output, require_volume_file)
+    targets = require_formats(output, VOLUME_FORMATS)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.fitted(progress)
         with timed({}, "volumes", progress):

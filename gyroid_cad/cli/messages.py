@@ -18,6 +18,8 @@ __all__ = ["BAD_USAGE", "FAILED", "INTERRUPTED", "Session", "debug_option", "fai
 
 FAILED, BAD_USAGE, INTERRUPTED = 1, 2, 130
 _CONFIG = "gyroid_cad.config"
+# What a parameter may have been reckoned from.
+_GIVEN_AS = {"density": "porosity"}
 # Of a number of thousands of digits the beginning tells.
 _LONGEST_WORD, _SHOWN_OF_IT = 1000, 100
 
@@ -78,6 +80,9 @@ def label(context: click.Context | None, parameter: str) -> str:
     option = known.get(parameter)
     if context is None or not isinstance(option, click.Option):
         return parameter
+    other = _GIVEN_AS.get(parameter)
+    if context.params.get(parameter) is None and other is not None and context.params.get(other) is not None:
+        return f"{label(context, other)}: {parameter}"
     if context.get_parameter_source(parameter) == click.core.ParameterSource.DEFAULT_MAP:
         return str(context.meta[_CONFIG].place(parameter))
     return option.opts[0]

@@ -5,31 +5,25 @@ from __future__ import annotations
 import json
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import click
 
 from gyroid_cad.cli.console import print_check_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
+from gyroid_cad.cli.options import json_option, printer_option
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 
 __all__ = ["print_check_command"]
 
-_FILE_ENDINGS = (".stl", ".3mf")
 _HOW = ("printer", "deviation", "as_json", "quiet", "config")
 
 
 @click.command("print-check")
 @lattice_options_beside("FILE.stl|FILE.3mf|LATTICE.toml")
-@click.option(
-    "--printer",
-    default="form2",
-    show_default=True,
-    metavar="NAME|FILE.toml",
-    help="One that is known, or a TOML file of one's own like the package's printers.toml.",
-)
+@printer_option("One that is known, or a TOML file of one's own like the package's printers.toml.", "form2")
 @click.option("--deviation", type=float, metavar="MM", help="Of a lattice's triangles, as of build.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+@json_option
 @click.option("--quiet", is_flag=True, help="Print no table and no progress: the status tells.")
 @click.pass_context
 def print_check_command(
@@ -52,7 +46,7 @@ def print_check_command(
 
     chosen, file = printer_named(printer), given["config"]
     part: Any = file
-    if file is None or Path(file).suffix.lower() not in _FILE_ENDINGS:
+    if file is None or format_of(file) not in TRIANGLE_FORMATS:
         part = lattice_of(given)
     else:
         described = options_given(_HOW)

@@ -9,6 +9,7 @@ import click
 
 from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside
+from gyroid_cad.cli.options import file_paths
 
 __all__ = ["view_command"]
 
@@ -17,7 +18,12 @@ _TOML_ENDING = ".toml"
 
 @click.command("view")
 @lattice_options_beside("LATTICE.toml|FILE")
-@click.option("--screenshot", metavar="FILE.png", help="Draw into a file, off screen, instead of opening a window.")
+@click.option(
+    "--screenshot",
+    metavar="FILE.png",
+    shell_complete=file_paths,
+    help="Draw into a file, off screen, instead of opening a window.",
+)
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
     """Show a lattice, or a .step, .stp, .brep or .stl file, in CadQuery's viewer.

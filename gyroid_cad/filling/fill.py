@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats
+from gyroid_cad.common.choices import Kind, Schema, SurfaceName
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
@@ -31,7 +32,7 @@ from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
-from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
+from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
@@ -81,7 +82,7 @@ class FillReport:
         By stage.
     """
 
-    kind: str
+    kind: Kind
     cell_size: float
     thickness: float
     min_wall: float | None
@@ -152,7 +153,7 @@ class Filled:
     def write(
         self,
         *paths: str | os.PathLike[str],
-        schema: str = "ap214",
+        schema: Schema = "ap214",
         deviation: float | None = None,
         angle: float = 15.0,
         progress: Progress | None = None,
@@ -168,7 +169,7 @@ class Filled:
         limit = usual if deviation is None else finite_number("deviation", deviation)
         require_settings((1, 1, 1), schema, limit, angle)
         for path in targets:
-            if not self.report.closed and FORMATS[path.suffix.lower()] in TRIANGLE_FORMATS:
+            if not self.report.closed and format_of(path) in TRIANGLE_FORMATS:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
@@ -180,7 +181,7 @@ def fill(
     cell_size: float | None = None,
     thickness: FieldLike | None = None,
     density: FieldLike | None = None,
-    kind: str = SHEET,
+    kind: Kind = SHEET,
     origin: Point = (0.0, 0.0, 0.0),
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
@@ -192,7 +193,7 @@ def fill(
     openings: Sequence[Any] = (),
     tolerance: float | None = None,
     lattice: Lattice | None = None,
-    surface: str = USUAL.name,
+    surface: SurfaceName = "gyroid",
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -265,7 +266,7 @@ _InfillIn = Callable[["Part", Frame, Callable[[str], AbstractContextManager[None
 
 
 def _described(
-    kind: str,
+    kind: Kind,
     cell_size: float | None,
     thickness: FieldLike | None,
     density: FieldLike | None,
@@ -292,8 +293,11 @@ def _described(
         made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
+            name, given = ("thickness", thickness) if density is None else ("density", density)
             raise ParameterError(
-                "thickness", made.max_thickness, f"less than the part's smallest extent, {smallest:.6g} mm"
+                name,
+                given,
+                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
             )
         return made
 
@@ -306,7 +310,7 @@ def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
 
 
 def _reported(
-    filling: Filling, outcome: Outcome, kind: str, skin: float | None, drop_islands: bool, grams: float | None
+    filling: Filling, outcome: Outcome, kind: Kind, skin: float | None, drop_islands: bool, grams: float | None
 ) -> Filled:
 
     domains = outcome.domains

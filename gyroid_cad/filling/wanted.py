@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.checks import finite_number
+from gyroid_cad.common.choices import KINDS, Kind
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.limits import require_density, require_one, require_thickness
 
-__all__ = ["CHANNELS", "KINDS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
+__all__ = ["CHANNELS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
-SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS = ("sheet", "network-a", "network-b", "channels", "surface")
+SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +75,13 @@ class Regions:
 
 
 def regions_of(
-    kind: str, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw
+    kind: Kind, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw
 ) -> Regions:
     """The regions that a kind is made of.
 
     Parameters
     ----------
-    kind : str
-        One of :data:`KINDS`.
+    kind : {"sheet", "network-a", "network-b", "channels", "surface"}
     cell_size : float
         In mm.
     thickness, density : number or field, optional
@@ -130,7 +130,7 @@ def _wall(
     return Regions(regions, density=fraction)
 
 
-def _network(kind: str, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
+def _network(kind: Kind, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
     low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
     accepted = f"the network's volume fraction, one number above {low:.5f} and below {high:.5f}"
     fraction = finite_number("density", density, accepted)

@@ -28,6 +28,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
+from gyroid_cad.common.choices import Schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.step import fill_header, product_name, step_of_kernel
 
@@ -75,7 +76,7 @@ def write_assembly(
     part: NamedPart,
     places: Iterable[Place],
     path: str | os.PathLike[str],
-    schema: str = "ap214",
+    schema: Schema = "ap214",
     name: str | None = None,
 ) -> None:
     """Write a part once, and where it is to be found, in millimetres.

@@ -15,6 +15,7 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
+from gyroid_cad.common.formats import BREP, format_of
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
@@ -67,7 +68,7 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
     ExportError
         If it cannot be read, or holds no shape.
     """
-    if Path(path).suffix.lower() != ".brep":
+    if format_of(path) is not BREP:
         return read_step(path)
     shape = TopoDS_Shape()
     # Of text that is something else the kernel complains on standard output.

@@ -18,6 +18,7 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Wr
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TopoDS import TopoDS_Shape
 
+from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
@@ -30,7 +31,7 @@ __all__ = ["fill_header", "no_messages", "product_name", "read_step", "step_of_k
 def write_step(
     shape: TopoDS_Shape,
     path: str | os.PathLike[str],
-    schema: str = "ap214",
+    schema: Schema = "ap214",
     name: str | None = None,
     parameter_curves: bool = False,
 ) -> None:
@@ -67,7 +68,7 @@ def write_step(
 
 @contextmanager
 def step_of_kernel(
-    path: str | os.PathLike[str], schema: str, product: str, parameter_curves: bool = False
+    path: str | os.PathLike[str], schema: Schema, product: str, parameter_curves: bool = False
 ) -> Iterator[Path]:
     """Give a name for what the kernel's writer writes; what is there at the end is made compact and moved into place.
 

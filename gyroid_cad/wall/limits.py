@@ -11,6 +11,7 @@ from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import THINNEST_WALL
 
 __all__ = [
+    "percent_hint",
     "require_cell_size",
     "require_density",
     "require_one",
@@ -60,12 +61,25 @@ def require_density(density: float, cell_size: float, tube: TubeLaw) -> None:
     ParameterError
     """
     if not 0 < density < tube.max_density:
-        raise ParameterError(
-            "density", density, f"above 0 and below {tube.max_density:.5f}, where the wall meets itself"
-        )
+        accepted = f"above 0 and below {tube.max_density:.5f}, where the wall meets itself"
+        raise ParameterError("density", density, accepted + percent_hint(density))
     if tube.thickness(density) * cell_size < THINNEST_WALL:
         min_thickness = tube.density(THINNEST_WALL / cell_size)
         raise ParameterError("density", density, f"at least {min_thickness:.3g} (a wall of {THINNEST_WALL} mm)")
+
+
+def percent_hint(fraction: float) -> str:
+    """Return what a fraction given in percent would be, to be added to an error; nothing of what is no percentage.
+
+    Examples
+    --------
+    >>> percent_hint(30.0)
+    '; 30 % is 0.30'
+    """
+    if not 1 < fraction <= 100:
+        return ""
+    two, four = f"{fraction / 100:.2f}", f"{fraction / 100:.4g}"
+    return f"; {fraction:g} % is {two if float(two) == float(four) else four}"
 
 
 def require_one(thickness: object, density: object) -> None:

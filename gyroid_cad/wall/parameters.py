@@ -11,12 +11,13 @@ from typing import Self
 from numpy.typing import ArrayLike
 
 from gyroid_cad.common.checks import finite_number, positive_number
+from gyroid_cad.common.choices import TRIMS, SurfaceName, Trim
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.fields.makers import paper_units
 from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
-from gyroid_cad.surface.families import USUAL, MinimalSurface, surface_named
+from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import build_complex
@@ -38,7 +39,6 @@ MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
 # Of a graded lattice, in cell sizes.
 USUAL_TOLERANCE = 1e-4
-BOX = "box"
 _FIELDS = {
     "thickness": "a length in mm",
     "density": "a volume fraction",
@@ -58,8 +58,8 @@ class LatticeParameters:
     scale_field: FieldLike | None = None
     map: MapLike | None = None
     tolerance: float | None = None
-    trim: str | None = None
-    surface: str = USUAL.name
+    trim: Trim | None = None
+    surface: SurfaceName = "gyroid"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -92,7 +92,7 @@ class LatticeParameters:
         scale: float = 1.0,
         fit: FitSettings | None = None,
         tolerance: float | None = None,
-        surface: str = USUAL.name,
+        surface: SurfaceName = "gyroid",
     ) -> Self:
         """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
 
@@ -166,7 +166,7 @@ class LatticeParameters:
         if self.uniform and self.tolerance is not None:
             settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
         tolerance = self.tolerance or USUAL_TOLERANCE
-        return LatticeSpec(self.cells, self.grading(), settings, tolerance, self.trim == BOX)
+        return LatticeSpec(self.cells, self.grading(), settings, tolerance, self.trim is not None)
 
     def grading(self) -> Grading:
         """Return how wall and space vary, or that they do not."""
@@ -196,8 +196,8 @@ class LatticeParameters:
             raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
 
     def _require_trim(self) -> None:
-        if self.trim not in (None, BOX):
-            raise ParameterError("trim", self.trim, f"{BOX}, or none for whole patches")
+        if self.trim is not None and self.trim not in TRIMS:
+            raise ParameterError("trim", self.trim, f"{' or '.join(TRIMS)}, or none for whole patches")
         if self.trim and (self.scale_field is not None or self.map is not None):
             raise ParameterError("trim", self.trim, "none where a map or a scale field carries the block elsewhere")
 

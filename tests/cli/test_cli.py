@@ -209,7 +209,7 @@ def test_the_config_of_an_assembly_makes_the_same_assembly(capsys: Captured, tmp
         (["build", "-o", "a.step", "--cells", "0", "1", "1", "--cell-size", "10", *WALL], ["--cells = (0, 1, 1)"]),
         (["build", "-o", "a.step", "--cells", "1", "1", "1", "--cell-size", "0", *WALL], ["--cell-size = 0.0"]),
         (["build", "-o", "a.step", "--cells", "1", "1", "1", "--cell-size", "nan", *WALL], ["--cell-size = nan"]),
-        (["build", "-o", "a.step", *ONE_CELL], ["exactly one of --thickness and --density"]),
+        (["build", "-o", "a.step", *ONE_CELL], ["exactly one of --thickness, --density, --porosity"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--density", "0.2"], ["exactly one of"]),
         (["build", "-o", "a.step", *ONE_CELL, "--thickness", "3.8"], ["--thickness = 3.8", "below 3.7647 mm"]),
         (["build", "-o", "a.step", *ONE_CELL, "--thickness", "thin"], ["--thickness", "thin"]),

@@ -120,17 +120,27 @@ def test_a_file_cut_short_is_refused(capsys: Captured, peg: Path, part: float) -
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--density", "0.3", "--thickness", "1"], "exactly one of the two"),
+        (["--density", "0.3", "--thickness", "1"], "exactly one of --thickness, --density"),
         (["--density", "2"], "--density = 2.0"),
+        (["--density", "30"], "; 30 % is 0.30"),
+        (["--porosity", "0.01"], "--porosity: density = 0.99"),
+        (["--porosity", "70"], "--porosity = 70.0: expected above 0 and below 1; 70 % is 0.70"),
         (["--thickness", "-1"], "--thickness = -1.0"),
         (["--density", "0.3", "--kind", "truss"], "--kind"),
         (["--density", "0.3", "--angle", "90"], "--angle"),
-        (["--thickness", "6", "--cell-size", "20"], "the part's smallest extent, 5 mm"),
+        (
+            ["--thickness", "6", "--cell-size", "20"],
+            "--thickness = '6': expected a wall below the part's smallest",
+        ),
+        (
+            ["--density", "0.9", "--cell-size", "20"],
+            "--density = '0.9': expected a wall below the part's smallest",
+        ),
         (["--density", "0.3 + q"], "--density"),
         (["--density", "0.3", "--skin", "-1"], "--skin = -1.0"),
         (["--density", "0.3", "--skin", "5"], "--skin = 5.0"),
         (["--density", "0.3", "--opening", ">Z"], "none without a skin"),
-        (["--density", "0.3", "--skin", "0.8", "--opening", "1,2"], "--openings = [1.0, 2.0]"),
+        (["--density", "0.3", "--skin", "0.8", "--opening", "1,2"], "--opening = [1.0, 2.0]"),
     ],
 )
 def test_bad_usage_is_one_line_and_leaves_no_file(capsys: Captured, peg: Path, options: list[str], words: str) -> None:

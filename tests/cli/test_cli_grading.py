@@ -142,7 +142,10 @@ def test_bad_usage_is_one_line_and_leaves_no_file(
         ('\nfit = "rough"', ["lattice.toml, line 2: fit: ", "rough"]),
         ('thickness = "q"', ["lattice.toml, line 1: thickness = 'q'", "'q' at column 1"]),
         ("thickness = -1", ["lattice.toml, line 1: thickness = -1.0: expected"]),
-        ("thickness = 1\ndensity = 0.3", ["exactly one of lattice.toml, line 1: thickness and lattice.toml, line 2"]),
+        (
+            "thickness = 1\ndensity = 0.3",
+            ["exactly one of lattice.toml, line 1: thickness, lattice.toml, line 2: density"],
+        ),
         ("json = true", ["lattice.toml, line 1: json"]),
         ("cells = [1", ["lattice.toml", "TOML"]),
     ],

@@ -143,6 +143,17 @@ def completed(monkeypatch: pytest.MonkeyPatch, captured: Captured, line: str) ->
         ("gyroid-cad build --surface d", ["diamond"]),
         ("gyroid-cad build --thickn", ["--thickness", "--thickness-factor"]),
         ("gyroid-cad completion ", ["bash", "zsh", "fish"]),
+        ("gyroid-cad build --surface ", ["gyroid", "diamond", "primitive"]),
+        ("gyroid-cad build --trim ", ["box"]),
+        ("gyroid-cad build --fit p", ["paper"]),
+        ("gyroid-cad build --schema ", ["ap214", "ap242"]),
+        ("gyroid-cad build --printer form", ["form2"]),
+        ("gyroid-cad print-check --printer f", ["form2"]),
+        ("gyroid-cad report --printer f", ["form2"]),
+        ("gyroid-cad fill part.step --kind network", ["network-a", "network-b"]),
+        ("gyroid-cad fill part.step --surface p", ["primitive"]),
+        ("gyroid-cad mesh --order ", ["1", "2"]),
+        ("gyroid-cad volumes --degree ", ["1", "3"]),
     ],
 )
 def test_a_shell_that_asks_is_told_what_may_follow(

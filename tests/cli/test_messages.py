@@ -52,6 +52,45 @@ def test_even_bad_usage_shows_where_it_was_found_when_debugging(capsys: Captured
     assert failed.err.splitlines()[-1].endswith("a.toml, line 1: cell_size: 'ten' is not a valid float.")
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            ["--density", "30"],
+            "--density = 30.0: expected above 0 and below 0.94033, where the wall meets itself; 30 % is 0.30",
+        ),
+        (["--density", "2.5"], "; 2.5 % is 0.025"),
+        (["--porosity", "70"], "--porosity = 70.0: expected above 0 and below 1; 70 % is 0.70"),
+        (["--porosity", "0.01"], "--porosity: density = 0.99: expected above 0 and below 0.94033"),
+        (["--porosity", "0.1*x"], "--porosity: density = -0.25 at (x, y, z) = (12.5, 2.5, 7.5) mm: expected above 0"),
+        (
+            ["--porosity", "0.7 + q"],
+            "--porosity = '0.7 + q': expected an expression of x, y, z; unknown name 'q' at column 7",
+        ),
+        (["--porosity", "0.7", "--density", "0.3"], "exactly one of --density, --porosity"),
+    ],
+)
+@pytest.mark.parametrize("command", [["build", "-o", "a.step"], ["report", "--json"], ["volumes", "-o", "a.json"]])
+def test_a_fraction_of_the_volume_is_refused_by_the_name_it_was_given(
+    capsys: Captured, command: list[str], options: list[str], words: str
+) -> None:
+    failed = run(capsys, *command, *LATTICE[:6], "--control-points", "5", *options)
+    assert failed.status == 2
+    assert words in failed.err
+
+
+@pytest.mark.parametrize(
+    ("porosity", "density"), [("0.7", "0.3"), ("0.6 + 0.01*x", "1 - (0.6 + 0.01*x)")], ids=["a number", "a formula"]
+)
+def test_a_porosity_is_what_the_density_leaves(capsys: Captured, tmp_path: Path, porosity: str, density: str) -> None:
+    keys = "cells = [1, 1, 1]\ncell_size = 10\ncontrol_points = 5\ntolerance = 0.01\ndeviation = 0.2\n"
+    for name, given in (("porosity", porosity), ("density", density)):
+        (tmp_path / f"{name}.toml").write_text(f"{keys}{name} = '{given}'\noutput = '{name}.stl'\n")
+        done = run(capsys, "build", tmp_path / f"{name}.toml")
+        assert done.status == 0, done.err
+    assert (tmp_path / "porosity.stl").read_bytes() == (tmp_path / "density.stl").read_bytes()
+
+
 def test_what_lacks_in_a_file_is_asked_for_as_an_option_or_a_key(capsys: Captured, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("cells = [1, 1, 1]\nthickness = 0.8")
     failed = run(capsys, "build", tmp_path / "a.toml", "-o", tmp_path / "a.step")
@@ -106,4 +145,4 @@ def test_without_a_word_too_much_the_program_says_it_too(tmp_path: Path) -> None
     command = [sys.executable, "-m", "gyroid_cad", "build", *LATTICE, "-o", str(tmp_path / "a.step"), "--density", "3"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "gyroid-cad: error: give exactly one of --thickness and --density\n"
+    assert done.stderr == "gyroid-cad: error: give exactly one of --thickness, --density\n"

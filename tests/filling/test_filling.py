@@ -279,7 +279,7 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"origin": (0, 0)}, "origin = (0, 0): expected three finite numbers"),
         ({"rotation": 3}, "rotation = 3: expected three finite numbers"),
         ({"material_density": -1}, "material_density = -1"),
-        ({"part": cq.Workplane().box(9, 9, 0.5)}, "less than the part's smallest extent, 0.5 mm"),
+        ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's smallest extent, 0.5 mm"),
     ],
 )
 def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], words: str) -> None:

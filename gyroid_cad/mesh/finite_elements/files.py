@@ -12,26 +12,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.formats import (
+    ABAQUS,
+    ANSYS,
+    GMSH,
+    MESH_FORMATS,
+    NASTRAN,
+    VTU,
+    Format,
+    listed_endings,
+    require_format,
+)
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.mesh.finite_elements.abaqus import abaqus_name, write_abaqus
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
-__all__ = ["MESH_FORMATS", "require_mesh_format", "write_mesh"]
+__all__ = ["require_mesh_format", "write_mesh"]
 
 Integers = NDArray[np.int64]
 
-MESH_FORMATS = {
-    ".vtu": "vtu",
-    ".msh": "gmsh",
-    ".inp": "abaqus",
-    ".cdb": "ansys",
-    ".bdf": "nastran",
-    ".nas": "nastran",
-}
 # Without nodes in the middle of faces.
-_NO_FULL = ("abaqus", "ansys", "nastran")
+_NO_FULL = (ABAQUS, ANSYS, NASTRAN)
 _NASTRAN_DIGITS = 10
 # The whole wall's physical group in Gmsh files; surfaces follow. Bounding cells are told by the element's entity.
 _WALL_GROUP = 1
@@ -44,13 +47,14 @@ def require_mesh_format(path: str | os.PathLike[str], full: bool = False) -> Pat
     ------
     ParameterError
     """
-    ending = Path(path).suffix.lower()
-    if ending not in MESH_FORMATS:
-        raise ParameterError("output", str(path), f"a file name ending in {', '.join(MESH_FORMATS)}")
-    if full and MESH_FORMATS[ending] in _NO_FULL:
-        raise ParameterError("full", full, f"none in {ending} files; .vtu and .msh have elements of 27 nodes")
-    if MESH_FORMATS[ending] == "ansys":
-        _mapdl_archive()
+    target, form = Path(path), require_format("output", path, MESH_FORMATS)
+    if full and form in _NO_FULL:
+        others = listed_endings([other for other in MESH_FORMATS if other not in _NO_FULL])
+        raise ParameterError(
+            "full", full, f"none in {target.suffix.lower()} files; elements of 27 nodes go into {others}"
+        )
+    if form is ANSYS:
+        _mapdl_archive(path)
     return require_writable(path)
 
 
@@ -80,20 +84,20 @@ def write_mesh(
     ParameterError, ExportError
     """
     target = require_mesh_format(path, len(mesh.element.nodes) in (9, 27))
-    kind = MESH_FORMATS[target.suffix.lower()]
+    form = require_format("output", target, MESH_FORMATS)
     with replacing(target) as temporary:
-        if kind == "abaqus":
+        if form is ABAQUS:
             abaqus_name(mesh)
             with temporary.open("w", encoding="ascii") as file:
                 write_abaqus(mesh, file, pairs, progress)
             return
-        writers: dict[str, Callable[[], None]] = {
-            "vtu": lambda: _write_by_meshio(_vtu(mesh, pairs), temporary, "vtu"),
-            "gmsh": lambda: _write_by_meshio(_gmsh(mesh), temporary, "gmsh22", binary=True),
-            "nastran": lambda: _write_nastran(mesh, temporary),
-            "ansys": lambda: _write_ansys(mesh, temporary),
+        writers: dict[Format, Callable[[], None]] = {
+            VTU: lambda: _write_by_meshio(_vtu(mesh, pairs), temporary, "vtu"),
+            GMSH: lambda: _write_by_meshio(_gmsh(mesh), temporary, "gmsh22", binary=True),
+            NASTRAN: lambda: _write_nastran(mesh, temporary),
+            ANSYS: lambda: _write_ansys(mesh, temporary),
         }
-        writers[kind]()
+        writers[form]()
 
 
 def _write_by_meshio(mesh: Any, path: Path, file_format: str, **options: Any) -> None:
@@ -163,19 +167,19 @@ def _write_nastran(mesh: Mesh, path: Path) -> None:
     path.write_text("SOL 101\nCEND\n" + deck, encoding="ascii")
 
 
-def _mapdl_archive() -> Any:
+def _mapdl_archive(path: str | os.PathLike[str]) -> Any:
     try:
         import mapdl_archive
         import pyvista
     except ImportError:
         raise ParameterError(
-            "output", ".cdb", "another ending, or mapdl-archive installed: pip install 'gyroid_cad[ansys]'"
+            "output", str(path), "another ending, or mapdl-archive installed: pip install 'gyroid_cad[ansys]'"
         ) from None
     return mapdl_archive, pyvista
 
 
 def _write_ansys(mesh: Mesh, path: Path) -> None:
-    mapdl_archive, pyvista = _mapdl_archive()
+    mapdl_archive, pyvista = _mapdl_archive(path)
     vtk_type = {
         "hexahedron": pyvista.CellType.HEXAHEDRON,
         "hexahedron20": pyvista.CellType.QUADRATIC_HEXAHEDRON,

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import PNG, require_output
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.corner_measures import NO_NUMBER
 
@@ -265,7 +266,6 @@ def _both_summaries(
     )
 
 
-_FORMAT = ".png"
 _COLUMNS = 4
 # In inches, of each histogram; and how fine.
 _WIDTH, _HEIGHT, _DOTS_PER_INCH = 3.1, 2.3, 110
@@ -280,9 +280,7 @@ def require_histogram(path: str | os.PathLike[str]) -> Path:
     ParameterError
         If the path does not end in .png or cannot be written to, or matplotlib is missing.
     """
-    target = require_writable(path)
-    if target.suffix.lower() != _FORMAT:
-        raise ParameterError("histogram", str(path), f"a file name ending in {_FORMAT}")
+    target = require_output(path, [PNG], "histogram")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError:

@@ -17,13 +17,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.common.checks import finite_numbers
 from gyroid_cad.common.files import replacing, require_writable
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.common.formats import (
+    GISMO,
+    JSON,
+    MFEM,
+    MFEM_FIELD,
+    NPZ,
+    VOLUME_FORMATS,
+    Format,
+    require_format,
+    require_output,
+)
 from gyroid_cad.mesh.iga.patches import BOUNDARY_PARTS, FACE_CORNERS, VolumePatches
 from gyroid_cad.version import __version__
 
-__all__ = ["VOLUME_FORMATS", "require_volume_file", "write_mfem_field", "write_volumes"]
+__all__ = ["write_mfem_field", "write_volumes"]
 
-FIELD_ENDING = ".gf"
 # MFEM's numbers of shapes (Geometry::Type).
 _SQUARE, _CUBE = 3, 5
 _ROWS_AT_ONCE = 4096
@@ -41,19 +50,6 @@ _ARRAYS = (
     "interface_alike",
     "boundary",
 )
-
-
-def require_volume_file(path: str | os.PathLike[str]) -> Path:
-    """Check, before any work is done, that trivariate patches can be written to ``path``.
-
-    Raises
-    ------
-    ParameterError
-        If its ending is none of VOLUME_FORMATS, or a file cannot be put there.
-    """
-    if Path(path).suffix.lower() not in VOLUME_FORMATS:
-        raise ParameterError("output", str(path), f"a file name ending in {', '.join(VOLUME_FORMATS)}")
-    return require_writable(path)
 
 
 def write_volumes(volumes: VolumePatches, path: str | os.PathLike[str]) -> None:
@@ -78,9 +74,9 @@ def write_volumes(volumes: VolumePatches, path: str | os.PathLike[str]) -> None:
     ExportError
         If writing failed.
     """
-    target = require_volume_file(path)
-    with replacing(target) as temporary:
-        VOLUME_FORMATS[target.suffix.lower()](volumes, temporary)
+    form = require_format("output", path, VOLUME_FORMATS)
+    with replacing(require_writable(path)) as temporary:
+        _WRITERS[form](volumes, temporary)
 
 
 def write_mfem_field(volumes: VolumePatches, values: ArrayLike, path: str | os.PathLike[str]) -> None:
@@ -106,9 +102,7 @@ def write_mfem_field(volumes: VolumePatches, values: ArrayLike, path: str | os.P
         If writing failed.
     """
     field = finite_numbers("values", values, "a finite number for each control point", (len(volumes.control_points),))
-    if Path(path).suffix.lower() != FIELD_ENDING:
-        raise ParameterError("output", str(path), f"a file name ending in {FIELD_ENDING}")
-    with replacing(require_writable(path)) as temporary, temporary.open("w", encoding="ascii") as file:
+    with replacing(require_output(path, [MFEM_FIELD])) as temporary, temporary.open("w", encoding="ascii") as file:
         file.write("FiniteElementSpace\nFiniteElementCollection: NURBS\nVDim: 1\nOrdering: 0\n\nNURBS_patches\n")
         for numbers in volumes.patch_points:
             file.write(_lines(_u_fastest(field[numbers])[:, np.newaxis]))
@@ -223,11 +217,11 @@ def _write_npz(volumes: VolumePatches, path: Path) -> None:
         )
 
 
-VOLUME_FORMATS: dict[str, Callable[[VolumePatches, Path], None]] = {
-    ".mesh": _write_mfem,
-    ".xml": _write_gismo,
-    ".json": _write_json,
-    ".npz": _write_npz,
+_WRITERS: dict[Format, Callable[[VolumePatches, Path], None]] = {
+    MFEM: _write_mfem,
+    GISMO: _write_gismo,
+    JSON: _write_json,
+    NPZ: _write_npz,
 }
 
 

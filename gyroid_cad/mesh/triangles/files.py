@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, require_format
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["TRIANGLE_ENDINGS", "read_triangles"]
+__all__ = ["read_triangles"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-TRIANGLE_ENDINGS = (".stl", ".3mf")
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 _HEADER_BYTES = 84
 _EXPECTED = "a file of triangles, binary or text STL, or 3MF"
@@ -41,15 +41,13 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
         If the file cannot be read, or holds no triangles.
     """
     target = Path(path)
-    ending = target.suffix.lower()
-    if ending not in TRIANGLE_ENDINGS:
-        raise ParameterError("file", str(path), f"{_EXPECTED}: a name ending in {' or '.join(TRIANGLE_ENDINGS)}")
+    form = require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
     try:
         with target.open("rb") as file:
             file.read(1)
     except OSError as problem:
         raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {problem.strerror}") from None
-    vertices, triangles = _read_3mf(target) if ending == ".3mf" else _merged(_stl_corners(target))
+    vertices, triangles = _read_3mf(target) if form is THREE_MF else _merged(_stl_corners(target))
     if not len(triangles) or not np.isfinite(vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
     return vertices, triangles

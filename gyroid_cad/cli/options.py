@@ -1,0 +1,89 @@
+"""Declarations of options that several commands share: files, triangles, printers, how a command answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+import click
+from click.shell_completion import CompletionItem
+
+from gyroid_cad.common.choices import SCHEMAS
+
+__all__ = [
+    "angle_option",
+    "deviation_option",
+    "file_paths",
+    "json_option",
+    "one_of",
+    "output_option",
+    "printer_option",
+    "quiet_option",
+    "schema_option",
+]
+
+Declared = TypeVar("Declared", bound=Callable[..., object])
+
+
+class Decorator(Protocol):
+    """Declares an option of a command."""
+
+    def __call__(self, function: Declared, /) -> Declared: ...
+
+
+def file_paths(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Leave the completion of a path to the shell."""
+    return [CompletionItem(incomplete, type="file")]
+
+
+def _printers(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Printers that are known, and files of one's own."""
+    from gyroid_cad.printing.printers import printers
+
+    known = [CompletionItem(key, help=printer.name) for key, printer in printers().items()]
+    return [item for item in known if item.value.startswith(incomplete)] or file_paths(context, parameter, incomplete)
+
+
+def one_of(*words: str) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
+    """Complete to these words, where the type of an option cannot say which they are."""
+    return lambda context, parameter, incomplete: [CompletionItem(w) for w in words if w.startswith(incomplete)]
+
+
+def printer_option(help: str, default: str | None = None) -> Decorator:
+    """Declare ``--printer``, by name or by a file of one's own."""
+    return click.option(
+        "--printer",
+        metavar="NAME|FILE.toml",
+        default=default,
+        show_default=default is not None,
+        shell_complete=_printers,
+        help=help,
+    )
+
+
+def output_option(endings: str, required: bool = False) -> Decorator:
+    """Declare ``-o``, for files with these endings."""
+    return click.option(
+        "-o", "--output", multiple=True, metavar="FILE", shell_complete=file_paths, help=endings, required=required
+    )
+
+
+schema_option = click.option(
+    "--schema", type=click.Choice(SCHEMAS), default="ap214", show_default=True, help="Of STEP files."
+)
+deviation_option = click.option(
+    "--deviation",
+    type=float,
+    metavar="MM",
+    help="Of the triangles in .stl and .3mf; a thousandth of the cell size if left out, or a tenth of a thin wall.",
+)
+angle_option = click.option(
+    "--angle",
+    type=float,
+    default=15.0,
+    show_default=True,
+    metavar="DEGREES",
+    help="Between triangles of a lattice or part that is cut; those of whole patches keep to the deviation alone.",
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
+quiet_option = click.option("--quiet", is_flag=True, help="Print no table and no progress.")

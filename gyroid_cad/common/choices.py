@@ -1,0 +1,27 @@
+"""Options that are one of a few words: their types, and the words themselves for what asks at run time.
+
+Nothing else is loaded with them, so that ``--help`` and a shell's completion may ask too.
+
+>>> KINDS
+('sheet', 'network-a', 'network-b', 'channels', 'surface')
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+__all__ = ["FITS", "KINDS", "SCHEMAS", "SURFACE_NAMES", "TRIMS", "FitName", "Kind", "Schema", "SurfaceName", "Trim"]
+
+Kind = Literal["sheet", "network-a", "network-b", "channels", "surface"]
+SurfaceName = Literal["gyroid", "diamond", "primitive"]
+Trim = Literal["box"]
+# Of STEP files.
+Schema = Literal["ap214", "ap242"]
+# On the command line, where no FitSettings can be given.
+FitName = Literal["smooth", "paper"]
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+SURFACE_NAMES: tuple[SurfaceName, ...] = get_args(SurfaceName)
+TRIMS: tuple[Trim, ...] = get_args(Trim)
+SCHEMAS: tuple[Schema, ...] = get_args(Schema)
+FITS: tuple[FitName, ...] = get_args(FitName)

@@ -102,9 +102,9 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         If the file could not be written or moved.
     """
     target = Path(path).resolve()
-    temporary = target.with_name(f".gyroid-cad-{secrets.token_hex(8)}.partial")
     try:
-        with _ended_in_order():
+        with _ended_in_order(), _reached(target.parent) as folder:
+            temporary = folder / f".gyroid-cad-{secrets.token_hex(8)}.partial"
             try:
                 yield temporary
                 with temporary.open("rb") as written:
@@ -123,6 +123,21 @@ def temporary_folder() -> Iterator[Path]:
     """Give a folder where the system keeps temporary files, and remove it with all that is in it."""
     with _ended_in_order(), TemporaryDirectory(prefix="gyroid-cad-") as folder:
         yield Path(folder)
+
+
+@contextmanager
+def _reached(folder: Path) -> Iterator[Path]:
+    """Give a name of a folder that every writer can say: libraries take none that is not UTF-8, but follow links."""
+    try:
+        str(folder).encode()
+        yield folder
+        return
+    except UnicodeEncodeError:
+        pass
+    with temporary_folder() as elsewhere:
+        link = elsewhere / "folder"
+        link.symlink_to(folder, target_is_directory=True)
+        yield link
 
 
 @contextmanager
@@ -152,4 +167,3 @@ def _ended_in_order() -> Iterator[None]:
     finally:
         for number in ours:
             signal.signal(number, signal.SIG_DFL)
-

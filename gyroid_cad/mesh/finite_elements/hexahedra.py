@@ -218,9 +218,7 @@ def _require_room(patches: int, subdivisions: int, layers: int, element: Element
     def accepted(left: int) -> str:
         return f"at most about {max(1, int(subdivisions * (left / needed) ** 0.5))} with {max(layers, 1)} layers"
 
-    require_room(
-        "subdivisions", subdivisions, needed, accepted, False, _BYTES_BEFORE, f"these {elements:,} elements"
-    )
+    require_room("subdivisions", subdivisions, needed, accepted, False, _BYTES_BEFORE, f"these {elements:,} elements")
 
 
 def _nodes(wall: Wall, steps: int, levels: Floats) -> Floats:

@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from OCP.Standard import Standard_OutOfMemory
 from OCP.TopoDS import TopoDS_Shape
@@ -120,14 +120,18 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
         return [future.result() for future in futures]
     except BrokenProcessPool as broken:
         raise KernelError("a process that split the part against the lattice ended too soon") from broken
-    except BaseException:
+    except BaseException as problem:
         # Nobody waits for what the kernel is at; and if not all could be started, the others would wait for ever.
         for process in multiprocessing.active_children():
             if process not in before:
                 process.kill()
+        if isinstance(problem, RuntimeError | OSError) and not isinstance(problem, KernelError):
+            raise KernelError(f"no processes could be started to split the part: {problem}") from problem
         raise
     finally:
-        executor.shutdown(cancel_futures=True)
+        # If none could be started there is no thread of the pool's to wait for.
+        with suppress(RuntimeError):
+            executor.shutdown(cancel_futures=True)
 
 
 @contextmanager

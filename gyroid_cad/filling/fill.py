@@ -22,13 +22,13 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.kernel.apart import read_shape
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.part import Part, require_part
 from gyroid_cad.kernel.selection import selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.split import compound_of
-from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
@@ -200,7 +200,7 @@ def fill(
     Parameters
     ----------
     part : shape, Workplane or path-like
-        A TopoDS_Shape, a shape of CadQuery or build123d, or a STEP file; its solids must be closed and valid.
+        A TopoDS_Shape, a shape of CadQuery or build123d, or a STEP or BREP file; its solids must be closed and valid.
     cell_size : float
         Period of the cubic cell, in mm.
     thickness : number or field, optional
@@ -365,16 +365,18 @@ def part_of(given: Any) -> Part:
     ------
     ParameterError
     ExportError
-        If a file is no STEP file or holds no shape.
+        If a file is neither STEP nor BREP, or holds no shape.
     """
 
     if isinstance(given, str | os.PathLike):
-        return require_part(read_step(given))
+        return require_part(read_shape(given))
     if hasattr(given, "vals"):
         return require_part(compound_of(shape.wrapped for shape in given.vals()))
     shape = getattr(given, "wrapped", given)
     if not hasattr(shape, "ShapeType"):
-        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
+        raise ParameterError(
+            "part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, a STEP or BREP file"
+        )
     return require_part(shape)
 
 

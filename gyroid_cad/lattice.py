@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import prod
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
@@ -14,10 +13,12 @@ from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilat
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS, require_formats, require_meshing
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.tables import cells_shown
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
-
-Corner = tuple[float, float, float]
 
 _LENGTH = "a length in mm, a finite number"
 
@@ -91,7 +90,7 @@ class Lattice(LatticeParameters):
         """
         return self.fitted().wall
 
-    def bounding_box(self) -> tuple[Corner, Corner]:
+    def bounding_box(self) -> tuple[Point, Point]:
         """Lowest and highest corner of the box round the wall, in mm."""
         low, high = (corner.tolist() for corner in self.fitted().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
@@ -176,7 +175,7 @@ class Lattice(LatticeParameters):
         if instances:
             require_assembly_formats(targets)
             require_settings((1, 1, 1), schema, deviation, angle)
-            self.assembly(progress).write(targets, schema, progress)
+            self.assembly(progress).write(*targets, schema=schema, progress=progress)
             return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
@@ -185,7 +184,7 @@ class Lattice(LatticeParameters):
             built = self.built(progress)
             built.write(solid, schema, self._deviation(deviation), angle, progress)
         if flat:
-            self.triangles(deviation, progress).write(flat, progress)
+            self.triangles(deviation, progress).write(*flat, progress=progress)
 
     def assembly(self, progress: Progress | None = None) -> Assembly:
         """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
@@ -210,8 +209,7 @@ class Lattice(LatticeParameters):
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
         """Tell whether files with these endings need the solid: triangles of whole patches do not."""
-        formats = {FORMATS[Path(path).suffix.lower()] for path in paths}
-        return bool(self.trim) or not formats <= set(TRIANGLE_FORMATS)
+        return bool(self.trim) or any(format_of(path) not in TRIANGLE_FORMATS for path in paths)
 
     def triangles(self, deviation: float | None = None, progress: Progress | None = None) -> Triangles:
         """The triangles behind STL and 3MF files of whole patches; no kernel is asked.
@@ -265,7 +263,7 @@ class Lattice(LatticeParameters):
         Returns
         -------
         Mesh
-            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.mesh_quality`.
+            Which :meth:`gyroid_cad.Mesh.write` puts into files and :func:`gyroid_cad.mesh_quality` measures.
 
         Raises
         ------
@@ -289,7 +287,7 @@ class Lattice(LatticeParameters):
         Returns
         -------
         VolumePatches
-            For :func:`gyroid_cad.write_volumes`.
+            Which :meth:`gyroid_cad.VolumePatches.write` puts into files.
 
         Raises
         ------
@@ -301,7 +299,7 @@ class Lattice(LatticeParameters):
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
         return periodic_pairs(mesh, self.cell_size)
 
-    def picture(self, size: tuple[int, int] = SIZE, camera: Corner = CAMERA) -> bytes:
+    def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
 
         Parameters
@@ -333,7 +331,7 @@ class Lattice(LatticeParameters):
 
     def _shown(self) -> list[tuple[str, str]]:
         """Rows that a notebook shows beside the picture."""
-        rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
+        rows = [("cells", cells_shown(self.cells, self.cell_size, self.grading().cells_alike))]
         drawn = prod(self.cells) <= self._most_drawn
         # What varies over so many cells would take long to measure.
         if self.uniform or drawn:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.console import print_fill, shown_progress
+from gyroid_cad.cli.console import print_report, shown_progress
 from gyroid_cad.cli.lattice_options import density_of, porosity_option, require_one_wall, surface_option
 from gyroid_cad.cli.options import (
     angle_option,
@@ -22,13 +22,14 @@ from gyroid_cad.cli.options import (
 )
 from gyroid_cad.common.choices import KINDS, Schema
 from gyroid_cad.common.files import file_sizes
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings
 
 __all__ = ["fill_command"]
 
 
 @click.command("fill")
 @click.argument("part", metavar="PART.step|PART.brep", shell_complete=file_paths)
-@output_option(".step, .stp, .brep, .stl or .3mf; may be repeated.", required=True)
+@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.", required=True)
 @surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
 @click.option(
@@ -109,7 +110,7 @@ def fill_command(
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_fill(summary)
+        print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
 
 
 def _face(opening: str) -> str | list[float]:

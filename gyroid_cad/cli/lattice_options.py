@@ -10,6 +10,7 @@ import click
 from gyroid_cad.cli.messages import label, remember_config
 from gyroid_cad.cli.options import file_paths
 from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS, FitName
+from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ __all__ = [
     "surface_option",
 ]
 
-_CONFIG_ENDING = ".toml"
 _WALL_OPTIONS = ("thickness", "density", "porosity")
 _OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map", "trim")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
@@ -42,7 +42,7 @@ _WRITTEN, _READ = ("output", "histogram", "screenshot"), ("printer",)
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
     """Put a file's values in the place of defaults, so that options on the command line override them."""
-    if path is not None and path.lower().endswith(_CONFIG_ENDING):
+    if path is not None and format_of(path) is TOML:
         from gyroid_cad.cli.config import read_config
 
         options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
@@ -64,7 +64,7 @@ def _default(context: click.Context, config: Config, key: str, multiple: bool) -
         if key in _WRITTEN:
             parts = [config.output(key, part, context.params["allow_outside"]) for part in parts]
         elif key in _READ:
-            parts = [config.beside(part) if part.lower().endswith(_CONFIG_ENDING) else part for part in parts]
+            parts = [config.beside(part) if format_of(part) is TOML else part for part in parts]
         return parts if multiple or not isinstance(given, str) else parts[0]
 
     return value
@@ -196,10 +196,8 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     """
     from gyroid_cad.lattice import Lattice
 
-    if given["config"] is not None and not given["config"].lower().endswith(_CONFIG_ENDING):
-        raise click.UsageError(
-            f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in {_CONFIG_ENDING}."
-        )
+    if given["config"] is not None and format_of(given["config"]) is not TOML:
+        raise click.UsageError(f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in .toml.")
     fit = _fit_settings(given["fit"], given["control_points"])
     _require_given(given, "cells")
     if any(given[name] is not None for name in _PAPER_OPTIONS):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import click
@@ -13,10 +12,10 @@ import click
 from gyroid_cad.cli.console import print_check_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.cli.options import json_option, printer_option
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 
 __all__ = ["print_check_command"]
 
-_FILE_ENDINGS = (".stl", ".3mf")
 _HOW = ("printer", "deviation", "as_json", "quiet", "config")
 
 
@@ -47,7 +46,7 @@ def print_check_command(
 
     chosen, file = printer_named(printer), given["config"]
     part: Any = file
-    if file is None or Path(file).suffix.lower() not in _FILE_ENDINGS:
+    if file is None or format_of(file) not in TRIANGLE_FORMATS:
         part = lattice_of(given)
     else:
         described = options_given(_HOW)

@@ -13,6 +13,7 @@ import click
 from gyroid_cad.cli.console import print_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.cli.options import file_paths, printer_option
+from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, require_format
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -80,17 +81,13 @@ def report_command(
 
 
 def _report(given: dict[str, Any], subdivisions: int, printer: str, progress: Progress | None) -> Report:
-    from gyroid_cad.report.file_sections import is_report_file
     from gyroid_cad.report.sections import report_on_file, report_on_lattice, require_subdivisions
 
     path = given["config"]
-    if path is None or path.lower().endswith(".toml"):
+    if path is None or format_of(path) is TOML:
         require_subdivisions(subdivisions)
         return report_on_lattice(lattice_of(given), subdivisions, progress, printer)
-    if not is_report_file(path):
-        from gyroid_cad.common.formats import FORMATS
-
-        raise ParameterError("input file", path, f"a lattice in a .toml file, or a file ending in {', '.join(FORMATS)}")
+    require_format("input file", path, PART_FORMATS, "a lattice in a .toml file, or a file ending in ")
     mixed = options_given(_COMMON)
     if mixed:
         raise click.UsageError(f"of a file there is nothing to choose: without {', '.join(mixed)}")

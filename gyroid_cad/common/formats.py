@@ -1,9 +1,14 @@
-"""Formats of files and their settings, checked before anything is built, without the kernel."""
+"""Formats of files: one table of their names, endings and contents; and the settings they are written with.
+
+Whoever reads or writes a file asks this table what its ending means. It names formats only: the code that writes each
+is loaded when it is needed, and stands with what it writes.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
 from numbers import Real
 from pathlib import Path
@@ -14,35 +19,184 @@ from gyroid_cad.common.files import require_distinct, require_writable
 from gyroid_cad.errors import ParameterError
 
 __all__ = [
+    "ABAQUS",
+    "ANSYS",
+    "BREP",
     "DEFAULT_ANGLE",
     "FORMATS",
+    "GISMO",
+    "GMSH",
+    "HTML",
+    "JSON",
+    "MESH_FORMATS",
+    "MFEM",
+    "MFEM_FIELD",
+    "NASTRAN",
+    "NPZ",
+    "PART_FORMATS",
+    "PNG",
+    "STEP",
+    "STL",
+    "THREE_MF",
+    "TOML",
     "TRIANGLE_FORMATS",
+    "VOLUME_FORMATS",
+    "VTU",
+    "Format",
+    "format_of",
+    "listed_endings",
+    "listed_formats",
+    "require_format",
     "require_formats",
     "require_meshing",
+    "require_output",
     "require_schema",
 ]
 
-FORMATS = {".step": "step", ".stp": "step", ".brep": "brep", ".stl": "stl", ".3mf": "3mf"}
-TRIANGLE_FORMATS = ("stl", "3mf")
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format of files.
+
+    Attributes
+    ----------
+    name : str
+    endings : tuple of str
+        Of file names, lower case.
+    holds : str
+        "solid", "triangles", "mesh", "volumes", "field", "page", "picture" or "lattice".
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    holds: str
+
+
+STEP = Format("STEP", (".step", ".stp"), "solid")
+BREP = Format("BREP", (".brep",), "solid")
+STL = Format("STL", (".stl",), "triangles")
+THREE_MF = Format("3MF", (".3mf",), "triangles")
+VTU = Format("VTU", (".vtu",), "mesh")
+GMSH = Format("Gmsh", (".msh",), "mesh")
+ABAQUS = Format("Abaqus, CalculiX", (".inp",), "mesh")
+ANSYS = Format("ANSYS", (".cdb",), "mesh")
+NASTRAN = Format("NASTRAN", (".bdf", ".nas"), "mesh")
+MFEM = Format("MFEM NURBS mesh v1.0", (".mesh",), "volumes")
+GISMO = Format("G+Smo multipatch", (".xml",), "volumes")
+JSON = Format("JSON", (".json",), "volumes")
+NPZ = Format("NPZ", (".npz",), "volumes")
+MFEM_FIELD = Format("MFEM GridFunction", (".gf",), "field")
+HTML = Format("HTML", (".html", ".htm"), "page")
+PNG = Format("PNG", (".png",), "picture")
+TOML = Format("TOML", (".toml",), "lattice")
+
+FORMATS = (
+    STEP,
+    BREP,
+    STL,
+    THREE_MF,
+    *(VTU, GMSH, ABAQUS, ANSYS, NASTRAN),
+    *(MFEM, GISMO, JSON, NPZ, MFEM_FIELD),
+    *(HTML, PNG, TOML),
+)
+TRIANGLE_FORMATS, MESH_FORMATS, VOLUME_FORMATS = (
+    tuple(form for form in FORMATS if form.holds == contents) for contents in ("triangles", "mesh", "volumes")
+)
+# What a lattice is built into, or a part filled.
+PART_FORMATS = tuple(form for form in FORMATS if form.holds in ("solid", "triangles"))
+_OF_ENDING = MappingProxyType({ending: form for form in FORMATS for ending in form.endings})
+
 # By the names of the kernel's STEP writer.
 _KERNEL_SCHEMAS: Mapping[Schema, str] = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
 # Degrees between neighbouring facets.
 DEFAULT_ANGLE = 15.0
 
 
-def require_formats(paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """Check the endings and folders of files to be written, before anything is built.
+def format_of(path: str | os.PathLike[str]) -> Format | None:
+    """Return the format that a file's name stands for, if any does.
+
+    Examples
+    --------
+    >>> format_of("Bracket.STP").name
+    'STEP'
+    >>> format_of("bracket.obj")
+    """
+    return _OF_ENDING.get(Path(path).suffix.lower())
+
+
+def listed_endings(formats: Sequence[Format]) -> str:
+    """Return the endings of formats as a message lists them.
+
+    Examples
+    --------
+    >>> listed_endings(TRIANGLE_FORMATS)
+    '.stl or .3mf'
+    >>> listed_endings(PART_FORMATS)
+    '.step, .stp, .brep, .stl or .3mf'
+    """
+    *others, last = [ending for form in formats for ending in form.endings]
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def listed_formats(formats: Sequence[Format]) -> str:
+    """Return formats with their endings, as the help of an option lists them.
+
+    Examples
+    --------
+    >>> listed_formats([BREP, NASTRAN])
+    'BREP (.brep), NASTRAN (.bdf, .nas)'
+    """
+    return ", ".join(f"{form.name} ({', '.join(form.endings)})" for form in formats)
+
+
+def require_format(
+    option: str, path: str | os.PathLike[str], formats: Sequence[Format], accepted: str = "a file name ending in "
+) -> Format:
+    """Return the format of a file's name, which must be one of some formats.
+
+    Parameters
+    ----------
+    option : str
+        By which the file was named, for errors.
+    path : path-like
+    formats : sequence of Format
+    accepted : str
+        What would be accepted, for errors; the endings follow.
 
     Raises
     ------
     ParameterError
     """
-    return require_distinct(paths, _require_format)
+    found = format_of(path)
+    if found is None or found not in formats:
+        raise ParameterError(option, str(path), accepted + listed_endings(formats))
+    return found
 
 
-def _require_format(path: str | os.PathLike[str]) -> Path:
-    if Path(path).suffix.lower() not in FORMATS:
-        raise ParameterError("output", str(path), f"a file name ending in {', '.join(FORMATS)}")
+def require_formats(paths: Sequence[str | os.PathLike[str]], formats: Sequence[Format] = PART_FORMATS) -> list[Path]:
+    """Check the endings and folders of files to be written, before anything is built.
+
+    Parameters
+    ----------
+    paths : sequence of path-like
+    formats : sequence of Format
+        Those that can be written.
+
+    Raises
+    ------
+    ParameterError
+    """
+    return require_distinct(paths, lambda path: require_output(path, formats))
+
+
+def require_output(path: str | os.PathLike[str], formats: Sequence[Format], option: str = "output") -> Path:
+    """Check the ending and the folder of one file to be written.
+
+    Raises
+    ------
+    ParameterError
+    """
+    require_format(option, path, formats)
     return require_writable(path)
 
 

@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
-from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, topology
 from gyroid_cad.kernel.part import Part, measure
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
+from gyroid_cad.kernel.split import bounded_solids, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
@@ -28,7 +29,6 @@ from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
 __all__ = ["Filling", "Made", "Outcome"]
 
 Floats = NDArray[np.float64]
-Point = tuple[float, float, float]
 
 # Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
 _BOUNDARY_SPACING = 1 / 12

@@ -9,12 +9,12 @@ from importlib.resources import files
 from typing import Any
 
 from gyroid_cad.common.checks import finite_numbers, positive_number
+from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.common.inputs import read_toml
 from gyroid_cad.errors import ParameterError
 
 __all__ = ["Printer", "printer_named", "printers"]
 
-_ENDING = ".toml"
 _LENGTH = "a length in mm, a finite number above 0"
 
 
@@ -72,8 +72,8 @@ def printer_named(given: str) -> Printer:
     known = printers()
     if str(given) in known:
         return known[str(given)]
-    if not str(given).lower().endswith(_ENDING):
-        raise ParameterError("printer", str(given), f"{', '.join(known)}, or the path of a {_ENDING} file of your own")
+    if format_of(given) is not TOML:
+        raise ParameterError("printer", str(given), f"{', '.join(known)}, or the path of a .toml file of your own")
     own = _described(read_toml("printer", given)[0], str(given))
     if len(own) != 1:
         raise ParameterError("printer", str(given), f"a file with one table, of one printer; it has {len(own)}")

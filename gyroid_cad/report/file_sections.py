@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from gyroid_cad.common.formats import FORMATS, TRIANGLE_FORMATS
+from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, Format, require_format
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
-__all__ = ["FileContents", "file_section", "is_report_file", "read_contents"]
+__all__ = ["FileContents", "file_section", "read_contents"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +23,7 @@ class FileContents:
     Attributes
     ----------
     path : Path
+    form : Format
     measures : dict
         Plain values.
     facets : Facets, optional
@@ -34,15 +35,11 @@ class FileContents:
     """
 
     path: Path
+    form: Format
     measures: dict[str, Any]
     facets: Facets | None
     shape: Any = None
     triangles: Any = None
-
-
-def is_report_file(path: str) -> bool:
-    """Tell whether a path's ending is one of a file that can be reported on."""
-    return Path(path).suffix.lower() in FORMATS
 
 
 def read_contents(path: str) -> FileContents:
@@ -55,24 +52,22 @@ def read_contents(path: str) -> FileContents:
     ExportError
         If it cannot be read.
     """
-    target = Path(path)
-    if not is_report_file(path):
-        raise ParameterError("input file", path, f"a file name ending in {', '.join(FORMATS)}")
+    target, form = Path(path), require_format("input file", path, PART_FORMATS)
     if not target.is_file():
         raise ParameterError("input file", path, "a file that exists")
-    return _triangles_of(target) if FORMATS[target.suffix.lower()] in TRIANGLE_FORMATS else _shape_of(target)
+    return _triangles_of(target, form) if form in TRIANGLE_FORMATS else _shape_of(target, form)
 
 
 def file_section(contents: FileContents) -> dict[str, Any]:
     """Section on the contents of a file."""
     return {
-        "format": FORMATS[contents.path.suffix.lower()].upper(),
+        "format": contents.form.name,
         "bytes": contents.path.stat().st_size,
         **contents.measures,
     }
 
 
-def _shape_of(path: Path) -> FileContents:
+def _shape_of(path: Path, form: Format) -> FileContents:
     from gyroid_cad.kernel.apart import read_shape
     from gyroid_cad.kernel.reading import described
 
@@ -88,10 +83,10 @@ def _shape_of(path: Path) -> FileContents:
         **_sizes(found.low, found.high, found.volume if found.topology.closed else None, found.area),
     }
     facets = facets_of_shape(shape) if found.topology.faces and extent.max() > 0 else None
-    return FileContents(path, measures, facets, shape=shape)
+    return FileContents(path, form, measures, facets, shape=shape)
 
 
-def _triangles_of(path: Path) -> FileContents:
+def _triangles_of(path: Path, form: Format) -> FileContents:
     from gyroid_cad.mesh.triangles.files import read_triangles
     from gyroid_cad.mesh.triangles.measures import triangle_measures
 
@@ -108,7 +103,7 @@ def _triangles_of(path: Path) -> FileContents:
     }
     flat = found.area == 0
     facets = None if flat else facets_of_triangles(vertices, triangles, found.closed and found.volume > 0)
-    return FileContents(path, measures, facets, triangles=(vertices, triangles))
+    return FileContents(path, form, measures, facets, triangles=(vertices, triangles))
 
 
 def _sizes(low: Sequence[float], high: Sequence[float], volume: float | None, area: float) -> dict[str, Any]:

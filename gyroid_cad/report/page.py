@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from gyroid_cad.common.files import replacing, require_writable
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import HTML, require_output
 from gyroid_cad.mesh.finite_elements.summaries import shown_name
 from gyroid_cad.render.drawing import draw, snug_size
 from gyroid_cad.render.facets import COLOURS, Facets
@@ -28,7 +28,6 @@ __all__ = ["page_of", "require_page", "write_page"]
 
 Values = Mapping[str, Any]
 
-_ENDINGS = (".html", ".htm")
 # In pixels: of the first picture and of the others.
 _LARGE, _SMALL = 640, 400
 _SIGNIFICANT = 6
@@ -66,9 +65,7 @@ def require_page(path: str | os.PathLike[str]) -> Path:
     ------
     ParameterError
     """
-    if Path(path).suffix.lower() not in _ENDINGS:
-        raise ParameterError("output", str(path), f"a file name ending in {' or '.join(_ENDINGS)}")
-    return require_writable(path)
+    return require_output(path, [HTML])
 
 
 def write_page(report: Report, path: str | os.PathLike[str]) -> Path:
@@ -130,8 +127,8 @@ def _pictures(facets: Facets | None) -> str:
         return '<section><h2>Pictures</h2><p class="note">There is nothing to be seen.</p></section>'
     figures = []
     for index, (name, camera) in enumerate(VIEWS.items()):
-        width, height = snug_size(facets, camera, _SMALL if index else _LARGE)
-        image = data_uri(png(draw(facets, (width, height), camera)))
+        width, height = snug_size([facets], camera, _SMALL if index else _LARGE)
+        image = data_uri(png(draw([facets], (width, height), camera)))
         figures.append(
             f'<figure><img src="{image}" width="{width}" height="{height}" '
             f'alt="{escape(name)}"><figcaption>{escape(name)}</figcaption></figure>'

@@ -164,7 +164,7 @@ def test_triangles_are_no_part_and_the_message_says_what_is(capsys: Captured, tm
     (tmp_path / "part.stl").write_text("solid a\nendsolid a\n")
     failed = run(capsys, tmp_path / "part.stl", "-o", tmp_path / "a.step", *FILL, "--density", "0.3")
     assert failed.status == 1
-    assert "part.stl could not be read: STL holds triangles; a STEP or BREP file is needed" in failed.err
+    assert "part.stl could not be read: it is STL by its ending, where STEP or BREP is needed" in failed.err
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not STEP", b"ISO-10303-21;\nHEADER;\n"])

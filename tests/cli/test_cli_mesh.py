@@ -98,7 +98,7 @@ def test_a_lattice_in_a_file_is_meshed(capsys: Captured, tmp_path: Path) -> None
         (["--subdivisions", "2", "--full"], "--full = True"),
         (["--subdivisions", "2", "--order", "2", "--full"], "none in .inp files"),
         (["--subdivisions", "2", "--trim", "box"], "--trim = 'box'"),
-        (["--subdivisions", "2", "-o", "a.vtk"], "ending in .vtu, .msh, .inp, .cdb, .bdf, .nas"),
+        (["--subdivisions", "2", "-o", "a.vtk"], "ending in .vtu, .msh, .inp, .cdb, .bdf or .nas"),
         (["--subdivisions", "2", "-o", "./a.inp"], "each file once"),
         (["--subdivisions", "2", "--histogram", "a.jpg"], "--histogram = 'a.jpg'"),
         (["--subdivisions", "two"], "--subdivisions"),
@@ -138,7 +138,7 @@ def test_volumes_are_written_in_every_format(capsys: Captured, tmp_path: Path) -
     ("options", "words"),
     [
         (["-o", "a.mesh", "--degree", "2"], "--degree = 2: expected 1 or 3"),
-        (["-o", "a.vtu"], "ending in .mesh, .xml, .json, .npz"),
+        (["-o", "a.vtu"], "ending in .mesh, .xml, .json or .npz"),
         (["-o", "a.mesh", "-o", "./a.mesh"], "each file once"),
         (["-o", "a.mesh", "--trim", "box"], "--trim = 'box'"),
         ([], "Missing option '-o'"),

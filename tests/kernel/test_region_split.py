@@ -20,13 +20,13 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel import region_split, regions
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import hollow
 from gyroid_cad.kernel.solid import build_faces
-from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
+from gyroid_cad.kernel.split import Pieces, bounded_solids, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
@@ -169,7 +169,7 @@ def test_what_goes_wrong_in_a_process_is_an_error_of_the_kernel(
     happens: Callable[..., NoReturn], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part, cut, _ = subject("ball")
-    monkeypatch.setattr(region_split.Finding, "found", happens)
+    monkeypatch.setattr(region_split.RegionSplit, "found", happens)
     with pytest.raises(KernelError, match=said):
         split_by_region(part, cut, 2)
 

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import PNG, require_output
+from gyroid_cad.common.tables import text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.corner_measures import NO_NUMBER
 
@@ -28,7 +30,6 @@ __all__ = [
     "Quality",
     "combined",
     "draw_quality",
-    "quality_rows",
     "require_histogram",
     "shown_name",
     "shown_number",
@@ -116,6 +117,13 @@ class MeasureSummary:
         values = {name: getattr(self, name) for name in self.__slots__}
         return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
 
+    def cells(self, name: str) -> tuple[str, ...]:
+        """Numbers of the measure of this name, as a table shows them."""
+        numbers = (self.smallest, self.mean, self.largest, self.standard_deviation)
+        side = "<" if _KINDS[name].larger_is_better else ">"
+        place = (f"{coordinate + 0.0:.4g}" for coordinate in np.round(self.worst_place, 6).tolist())
+        return *map(shown_number, numbers), f"{self.beyond} {side} {self.bound:.3g}", ", ".join(place)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quality:
@@ -148,6 +156,17 @@ class Quality:
             "measures": {name: summary.as_dict() for name, summary in self.measures.items()},
         }
 
+    def header(self) -> tuple[str, ...]:
+        """Headings of the rows."""
+        return "measure", "smallest", "mean", "largest", "deviation", "beyond bound", "worst at (mm)"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """One line for each measure, as they are printed."""
+        return [(shown_name(name), *summary.cells(name)) for name, summary in self.measures.items()]
+
+    def __str__(self) -> str:
+        return text_table(self.rows(), self.header())
+
 
 def combined(qualities: Iterable[Quality]) -> Quality:
     """One report on several meshes of the same kind of element, numbered one after the other.
@@ -168,24 +187,6 @@ def shown_name(name: str) -> str:
 def shown_number(number: float) -> str:
     """A measure as people read it."""
     return "none" if number >= NO_NUMBER else f"{number:.4g}"
-
-
-def quality_rows(quality: Quality) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows of a table: a line for each measure."""
-    header = ("measure", "smallest", "mean", "largest", "deviation", "beyond bound", "worst at (mm)")
-    rows = []
-    for name, summary in quality.measures.items():
-        numbers = (summary.smallest, summary.mean, summary.largest, summary.standard_deviation)
-        side = "<" if _KINDS[name].larger_is_better else ">"
-        rows.append(
-            (
-                shown_name(name),
-                *map(shown_number, numbers),
-                f"{summary.beyond} {side} {summary.bound:.3g}",
-                ", ".join(f"{coordinate + 0.0:.4g}" for coordinate in np.round(summary.worst_place, 6).tolist()),
-            )
-        )
-    return header, rows
 
 
 def summary_of(name: str, values: Floats, bound: float, centres: Floats) -> MeasureSummary:
@@ -265,7 +266,6 @@ def _both_summaries(
     )
 
 
-_FORMAT = ".png"
 _COLUMNS = 4
 # In inches, of each histogram; and how fine.
 _WIDTH, _HEIGHT, _DOTS_PER_INCH = 3.1, 2.3, 110
@@ -280,9 +280,7 @@ def require_histogram(path: str | os.PathLike[str]) -> Path:
     ParameterError
         If the path does not end in .png or cannot be written to, or matplotlib is missing.
     """
-    target = require_writable(path)
-    if target.suffix.lower() != _FORMAT:
-        raise ParameterError("histogram", str(path), f"a file name ending in {_FORMAT}")
+    target = require_output(path, [PNG], "histogram")
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError:

@@ -1,4 +1,4 @@
-"""``gyroid-cad fill``: a part from a STEP file goes in, the same part filled with gyroid comes out."""
+"""``gyroid-cad fill``: a part from a STEP or BREP file goes in, the same part filled with gyroid comes out."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["fill_command"]
 
 
 @click.command("fill")
-@click.argument("part", metavar="PART.step", shell_complete=file_paths)
+@click.argument("part", metavar="PART.step|PART.brep", shell_complete=file_paths)
 @output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.", required=True)
 @surface_option
 @click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
@@ -87,7 +87,7 @@ def fill_command(
     quiet: bool,
     **given: Any,
 ) -> None:
-    """Fill the solids of a STEP file with gyroid and write what is left.
+    """Fill the solids of a STEP or BREP file with gyroid and write what is left.
 
     \b
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30

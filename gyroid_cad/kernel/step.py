@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import RLock
+from types import MappingProxyType
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
@@ -25,6 +26,9 @@ from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.step_text import compact_step
 from gyroid_cad.version import __version__
+
+# A host that wrote a file in inches leaves the kernel taking all lengths of shapes for inches.
+_OF_LENGTHS: Mapping[str, str | int] = MappingProxyType({"xstep.cascade.unit": "MM"})
 
 __all__ = ["fill_header", "no_messages", "product_name", "read_step", "step_of_kernel", "write_step"]
 
@@ -91,6 +95,7 @@ def step_of_kernel(
     settings: dict[str, str | int] = {
         "write.step.schema": require_schema(schema),
         "write.step.unit": "MM",
+        **_OF_LENGTHS,
         "write.step.product.name": product,
         "write.surfacecurve.mode": int(parameter_curves),
         # Of an assembly: the names of the faces of its parts.
@@ -119,7 +124,8 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     ExportError
         If the file is missing, not STEP, or holds no shape.
     """
-    with no_messages():
+    STEPControl_Reader()
+    with no_messages(), _kernel_settings(_OF_LENGTHS):
         reader = STEPControl_Reader()
         if reader.ReadFile(str(path)) != IFSelect_RetDone:
             raise ExportError(f"{path} could not be read as STEP")
@@ -158,7 +164,7 @@ def _name_product(writer: STEPControl_Writer, product: str) -> None:
 
 
 @contextmanager
-def _kernel_settings(settings: dict[str, str | int]) -> Iterator[None]:
+def _kernel_settings(settings: Mapping[str, str | int]) -> Iterator[None]:
     """Set ``Interface_Static`` values, which are global to the process, and put the old ones back."""
     # The first writer of a process registers the settings; the schema counts when a model is made.
     STEPCAFControl_Writer()

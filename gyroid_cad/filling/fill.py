@@ -22,6 +22,7 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.part import Part, require_part
 from gyroid_cad.kernel.selection import selected_faces
@@ -111,7 +112,7 @@ class FillReport:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filled:
+class Filled(HostShapes):
     """A filled part.
 
     Attributes

@@ -64,7 +64,7 @@ def _alone(kind: str, side: int) -> None:
     """Build, write, and print this process's peak and the size of what it wrote."""
     from benchmarks.subject import CELL_SIZE, block_solid
     from gyroid_cad.kernel.step import write_step
-    from gyroid_cad.kernel.stl import write_stl
+    from gyroid_cad.kernel.stl import write_meshed_stl
 
     solid = block_solid(side)
     size = 0
@@ -73,7 +73,7 @@ def _alone(kind: str, side: int) -> None:
         if kind == "step":
             write_step(solid, path)
         elif kind == "stl":
-            write_stl(solid, path, CELL_SIZE / 1000)
+            write_meshed_stl(solid, path, CELL_SIZE / 1000)
         if path.exists():
             size = path.stat().st_size
     print(peak(), size)

@@ -25,7 +25,7 @@ from benchmarks.timing import Row, arguments_for, best_in_turn, best_of, fresh_p
 from gyroid_cad.common.files import replacing
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.measuring import enclosed_volume
+from gyroid_cad.mesh.triangles.measuring import triangulated_volume
 from gyroid_cad.mesh.triangles.stl import write_stl
 from gyroid_cad.mesh.triangles.triangulation import triangulated
 from gyroid_cad.wall.offset import Wall
@@ -137,7 +137,7 @@ def _volume(wall: Wall) -> list[Row]:
     missing = []
     for count in _COUNTS:
         patches, edges = np.full(wall.complex.patch_count, count), np.full(wall.complex.edge_count, count)
-        missing.append(1 - enclosed_volume(wall, patches, edges, count) / wall.volume())
+        missing.append(1 - triangulated_volume(wall, patches, edges, count) / wall.volume())
     order = -float(np.polyfit(np.log(_COUNTS), np.log(missing), 1)[0])
     remark = f"corners on the faces, {_COUNTS[0]} to {_COUNTS[-1]} squares: {missing[0]:.1e} to {missing[-1]:.1e}"
     return [Row("order at which the volume nears the wall's", order, 1.9, at_least=True, remark=remark)]

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from gyroid_cad.former import Moved, former_name
+
 __all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"]
+
+_MOVED = {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}
+
+
+def __getattr__(name: str) -> Any:
+    return former_name(__name__, name, _MOVED.get(name))
 
 
 class GyroidError(Exception):

@@ -13,10 +13,12 @@ from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilat
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.tables import cells_shown
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
-
-Corner = tuple[float, float, float]
 
 _LENGTH = "a length in mm, a finite number"
 
@@ -91,7 +91,7 @@ class Lattice(LatticeParameters, HostShapes):
         """
         return self.fitted().wall
 
-    def bounding_box(self) -> tuple[Corner, Corner]:
+    def bounding_box(self) -> tuple[Point, Point]:
         """Lowest and highest corner of the box round the wall, in mm."""
         low, high = (corner.tolist() for corner in self.fitted().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
@@ -176,7 +176,7 @@ class Lattice(LatticeParameters, HostShapes):
         if instances:
             require_assembly_formats(targets)
             require_settings((1, 1, 1), schema, deviation, angle)
-            self.assembly(progress).write(targets, schema, progress)
+            self.assembly(progress).write(*targets, schema=schema, progress=progress)
             return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
@@ -185,7 +185,7 @@ class Lattice(LatticeParameters, HostShapes):
             built = self.built(progress)
             built.write(solid, schema, self._deviation(deviation), angle, progress)
         if flat:
-            self.triangles(deviation, progress).write(flat, progress)
+            self.triangles(deviation, progress).write(*flat, progress=progress)
 
     def assembly(self, progress: Progress | None = None) -> Assembly:
         """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
@@ -264,7 +264,7 @@ class Lattice(LatticeParameters, HostShapes):
         Returns
         -------
         Mesh
-            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.mesh_quality`.
+            Which :meth:`gyroid_cad.Mesh.write` puts into files and :func:`gyroid_cad.mesh_quality` measures.
 
         Raises
         ------
@@ -288,7 +288,7 @@ class Lattice(LatticeParameters, HostShapes):
         Returns
         -------
         VolumePatches
-            For :func:`gyroid_cad.write_volumes`.
+            Which :meth:`gyroid_cad.VolumePatches.write` puts into files.
 
         Raises
         ------
@@ -300,7 +300,7 @@ class Lattice(LatticeParameters, HostShapes):
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
         return periodic_pairs(mesh, self.cell_size)
 
-    def picture(self, size: tuple[int, int] = SIZE, camera: Corner = CAMERA) -> bytes:
+    def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
 
         Parameters
@@ -332,7 +332,7 @@ class Lattice(LatticeParameters, HostShapes):
 
     def _shown(self) -> list[tuple[str, str]]:
         """Rows that a notebook shows beside the picture."""
-        rows = [("cells", f"{' x '.join(map(str, self.cells))}, {self.cell_size:g} mm each")]
+        rows = [("cells", cells_shown(self.cells, self.cell_size, self.grading().cells_alike))]
         drawn = prod(self.cells) <= self._most_drawn
         # What varies over so many cells would take long to measure.
         if self.uniform or drawn:

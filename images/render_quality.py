@@ -15,12 +15,11 @@ from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
 from gyroid_cad import Lattice
 from gyroid_cad.builds.meshes import mesh_quality
-from gyroid_cad.cli.console import print_table
+from gyroid_cad.common.tables import text_table
 from gyroid_cad.mesh.finite_elements.quality import (
     Quality,
     element_measures,
     quality_report,
-    quality_rows,
     shown_name,
     shown_number,
 )
@@ -50,7 +49,7 @@ def main() -> list[Path]:
     """Draw both pictures and print both tables."""
     report = mesh_quality(LATTICE.hexahedra(STEPS, LAYERS))
     print(f"{report.elements:,} hexahedra, {STEPS} x {STEPS} a patch in {LAYERS} layers, thickness 0.1 L")
-    print_table(*quality_rows(report))
+    print(report)
     meshes = {
         "the paper's, polar (Fig. 4)": polar_mesh(),
         "the paper's parameters on a grid": grid_mesh("polar"),
@@ -100,7 +99,7 @@ def _print_comparison(reports: dict[str, Quality]) -> None:
         )
         rows.append((name, f"{report.elements}", *numbers))
     print("one patch: smallest / mean / largest")
-    print_table(("mesh", "elements", *(shown_name(name) for name in shown)), rows)
+    print(text_table(rows, ("mesh", "elements", *(shown_name(name) for name in shown))))
 
 
 def render_beside(meshes: dict[str, Mesh]) -> Path:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.nurbs.surface import basis, uniform_knots
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.trim.edge_crossings import PLANES, Faces
+from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 
 CELL_SIZE = 10.0
 THICKNESS = 0.8
@@ -33,7 +33,7 @@ class Graph(Protocol):
     A weight 1 + lean (u + v / 2) makes it a quotient; then it is exact for quadratics.
     """
 
-    def __call__(self, height: Height, levels: dict[int, float], lean: float = 0.0) -> Faces: ...
+    def __call__(self, height: Height, levels: dict[int, float], lean: float = 0.0) -> FacesToCut: ...
 
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
@@ -67,7 +67,7 @@ def kernel_volume() -> Callable[[Any], float]:
 
 @pytest.fixture(scope="session")
 def graph() -> Graph:
-    def face(height: Height, levels: dict[int, float], lean: float = 0.0) -> Faces:
+    def face(height: Height, levels: dict[int, float], lean: float = 0.0) -> FacesToCut:
         knots = uniform_knots(7)
         at = np.array([knots[k + 1 : k + 4].mean() for k in range(7)])
         u, v = np.meshgrid(at, at, indexing="ij")
@@ -76,7 +76,7 @@ def graph() -> Graph:
         inverse = np.linalg.inv(basis(knots, 3, at))
         control = np.einsum("ia,jb,abk->ijk", inverse, inverse, values)
         near = np.array([[levels.get(plane, np.nan) for plane in range(len(PLANES))]])
-        return Faces((control[..., :3] / control[..., 3:])[np.newaxis], control[..., 3], knots, near)
+        return FacesToCut((control[..., :3] / control[..., 3:])[np.newaxis], control[..., 3], knots, near)
 
     return face
 

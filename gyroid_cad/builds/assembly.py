@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import prod
@@ -12,9 +13,10 @@ import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import STEP, require_format
+from gyroid_cad.common.formats import STEP, require_format, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
+from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.wall.fitted import LatticeSpec
 
@@ -78,8 +80,16 @@ class Assembly:
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
         return NamedPart(solid, PART_NAME, GREEN, faces)
 
-    def write(self, targets: Sequence[Path], schema: Schema = "ap214", progress: Progress | None = None) -> None:
-        """Write STEP assemblies.
+    def write(self, *paths: str | os.PathLike[str], schema: Schema = "ap214", progress: Progress | None = None) -> None:
+        """Write STEP assemblies. A file appears whole or not at all.
+
+        Parameters
+        ----------
+        *paths : path-like
+            Ending in .step or .stp. All are checked before any is written.
+        schema : {"ap214", "ap242"}
+        progress : callable, optional
+            Called with (stage, done, total).
 
         Raises
         ------
@@ -91,7 +101,7 @@ class Assembly:
         """
         from gyroid_cad.kernel.assembly import write_assembly
 
-        require_assembly_formats(targets)
+        targets = require_formats(paths, [STEP])
         require_memory(self.cells, _BYTES_PER_INSTANCE)
         if not self.cell.valid(progress):
             raise KernelError("the kernel finds the solid of one cell invalid; nothing was written")
@@ -120,6 +130,8 @@ class AssemblyReport:
         The cell, by the kernel's own check; every edge bounds exactly two faces.
     volume, volume_exact : float
         In mm3, of all cells: enclosed by the kernel's faces, and by the tube formula.
+    area : float
+        In mm2, of all that bounds the cells, each by itself.
     seconds : dict
         By stage.
     """
@@ -134,11 +146,26 @@ class AssemblyReport:
     closed: bool
     volume: float
     volume_exact: float
+    area: float
     seconds: dict[str, float]
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
         return asdict(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        state = f"{'valid' if self.valid else 'invalid'} and {'closed' if self.closed else 'open'}"
+        return [
+            ("cells", cells_shown(self.cells, self.cell_size)),
+            ("wall", wall_shown(self.thickness, self.thickness, self.thickness, self.density)),
+            ("instances", f"{self.instances:,} of one {state} solid of {self.faces} faces, not fused"),
+            ("volume", volume_shown(self.volume, self.volume_exact)),
+            ("area", f"{self.area:.8g} mm2"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
 
 def assembly(spec: LatticeSpec, progress: Progress | None = None) -> Assembly:
@@ -186,6 +213,7 @@ def assembly_report(made: Assembly, thickness: float, density: float, volume_exa
         closed=made.cell.topology.closed,
         volume=count * made.cell.volume,
         volume_exact=volume_exact,
+        area=count * made.cell.area(),
         seconds=dict(made.cell.seconds),
     )
 

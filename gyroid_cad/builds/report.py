@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gyroid_cad.builds.solid import Build
+from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.surface.fit_report import fit_report
 
@@ -21,6 +22,8 @@ class LatticeReport:
     cells : tuple of int
     cell_size : float
         In mm, before any map.
+    cells_alike : bool
+        False where a scale field or a map makes cells of other sizes.
     thickness, min_thickness, max_thickness : float
         Whole wall in mm: its mean over the mid-surface and its extremes.
     density : float
@@ -37,6 +40,8 @@ class LatticeReport:
     volume, volume_exact : float
         In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
         where the lattice is graded; the latter none of a graded lattice that is cut.
+    area : float
+        In mm2, of all that bounds the solid: both faces, and side walls or flat sides.
     max_deviation : float
         In mm: of the fitted mid-surface along the exact normal, or of both faces where the lattice is graded.
     max_wall_error : float, optional
@@ -52,6 +57,7 @@ class LatticeReport:
 
     cells: tuple[int, int, int]
     cell_size: float
+    cells_alike: bool
     thickness: float
     min_thickness: float
     max_thickness: float
@@ -66,6 +72,7 @@ class LatticeReport:
     non_manifold_edges: int
     volume: float
     volume_exact: float | None
+    area: float
     max_deviation: float
     max_wall_error: float | None
     max_normal_angle: float
@@ -75,6 +82,37 @@ class LatticeReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
         return asdict(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        state = f"{'valid' if self.valid else 'invalid'} and {'closed' if self.closed else 'open'}"
+        return [
+            ("cells", cells_shown(self.cells, self.cell_size, self.cells_alike)),
+            ("wall", wall_shown(self.thickness, self.min_thickness, self.max_thickness, self.density)),
+            ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
+            ("boundary edges, non-manifold edges", f"{self.boundary_edges}, {self.non_manifold_edges}"),
+            ("volume", volume_shown(self.volume, self.volume_exact)),
+            ("area", f"{self.area:.8g} mm2"),
+            ("deviation", self._deviation_shown()),
+            *([("checked", self._checks_shown())] if self.samples_per_patch else []),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
+
+    def _deviation_shown(self) -> str:
+        n = self.control_points
+        shown = f"{self.max_deviation:.1e} mm, {self.max_normal_angle:.3f} degrees"
+        if self.max_wall_error is not None:
+            shown += f", wall {self.max_wall_error:.1e} of itself"
+        return f"{shown}; {n} x {n} control points a patch"
+
+    def _checks_shown(self) -> str:
+        samples = self.samples_per_patch
+        return (
+            f"at {samples['deviation']} sample points a patch for deviation, {samples['fold']} for local "
+            f"self-intersection, {samples['clearance']} for walls that meet"
+        )
 
 
 def report_of(built: Build, thickness: float, density: float, volume_exact: float | None) -> LatticeReport:
@@ -96,6 +134,7 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
     return LatticeReport(
         cells=built.cells,
         cell_size=cell_size,
+        cells_alike=spec.grading.cells_alike,
         thickness=thickness,
         min_thickness=refit.min_thickness if refit else thickness,
         max_thickness=refit.max_thickness if refit else thickness,
@@ -110,6 +149,7 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
         non_manifold_edges=0 if spec.trimmed else complex.non_manifold_edges,
         volume=built.volume,
         volume_exact=volume_exact,
+        area=built.area(),
         max_deviation=refit.max_deviation if refit else fit.max_distance * cell_size,
         max_wall_error=refit.max_wall_error if refit else None,
         max_normal_angle=refit.max_normal_angle if refit else fit.max_normal_angle,

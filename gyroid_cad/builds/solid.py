@@ -17,6 +17,7 @@ from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.box import Box, cut_to_box
+from gyroid_cad.wall.areas import fitted_areas
 from gyroid_cad.wall.covering import PERTURBATIONS
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
@@ -61,6 +62,7 @@ class Build:
         self.seconds = dict(fitted.seconds)
         self._valid: bool | None = None
         self.shift = (0.0, 0.0, 0.0)
+        self._cut_area = 0.0
         self._require_memory(_SOLID_BYTES_PER_CELL)
         with self.timed("kernel", progress):
             from gyroid_cad.kernel.check import enclosed_volume, topology
@@ -103,6 +105,7 @@ class Build:
             except KernelError as failed:
                 problem = problem or failed
                 continue
+            self._cut_area = float(left.areas.sum())
             self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
             shape = solids[0] if len(solids) == 1 else compound_of(solids)
             return shape, float(left.volumes.sum()), len({face.patch for face in left.faces})
@@ -120,6 +123,10 @@ class Build:
         """Tell that a stage begins and ends, and add the seconds between."""
         with timed(self.seconds, stage, progress):
             yield
+
+    def area(self) -> float:
+        """Area in mm2 of all that bounds the solid, by quadrature of the nets and of what was cut of them."""
+        return self._cut_area if self.fitted.spec.trimmed else fitted_areas(self.fitted.wall).total
 
     def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""
@@ -181,7 +188,7 @@ def write_shape(
     """
     from gyroid_cad.kernel.brep import write_brep
     from gyroid_cad.kernel.step import write_step
-    from gyroid_cad.kernel.stl import meshed, write_stl
+    from gyroid_cad.kernel.stl import meshed, write_meshed_stl
     from gyroid_cad.mesh.triangles.three_mf import write_3mf
 
     form = format_of(path)
@@ -190,7 +197,7 @@ def write_shape(
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:
-        write_stl(shape, path, deviation, angle)
+        write_meshed_stl(shape, path, deviation, angle)
     else:
         write_3mf(*meshed(shape, path, deviation, angle), path)
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
 from dataclasses import asdict, dataclass
 from math import ceil, prod
-from pathlib import Path
 from typing import Any
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import THREE_MF, format_of
+from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import write_stl
 from gyroid_cad.mesh.triangles.three_mf import write_3mf
 from gyroid_cad.mesh.triangles.triangulation import triangulated
+from gyroid_cad.wall.areas import fitted_areas
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
 __all__ = ["TriangleReport", "Triangles", "triangle_report", "triangles"]
@@ -42,8 +43,15 @@ class Triangles:
         with timed(self.seconds, "triangles", progress):
             self.triangulation = triangulated(fitted.wall, deviation)
 
-    def write(self, targets: Sequence[Path], progress: Progress | None = None) -> None:
-        """Write the triangles to each target in the format of its ending.
+    def write(self, *paths: str | os.PathLike[str], progress: Progress | None = None) -> None:
+        """Write files; each path's ending chooses STL (.stl) or 3MF (.3mf). A file appears whole or not at all.
+
+        Parameters
+        ----------
+        *paths : path-like
+            All are checked before any is written.
+        progress : callable, optional
+            Called with (stage, done, total).
 
         Raises
         ------
@@ -51,6 +59,7 @@ class Triangles:
             If a file cannot count so many triangles, or memory would not do for 3MF.
         ExportError
         """
+        targets = require_formats(paths, TRIANGLE_FORMATS)
         if any(format_of(path) is THREE_MF for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count
@@ -74,6 +83,8 @@ class TriangleReport:
     cells : tuple of int
     cell_size : float
         In mm, before any map.
+    cells_alike : bool
+        False where a scale field or a map makes cells of other sizes.
     thickness, min_thickness, max_thickness : float
         Whole wall in mm: its mean over the mid-surface and its extremes.
     density : float
@@ -90,6 +101,8 @@ class TriangleReport:
     volume, volume_wall, volume_exact : float
         In mm3: enclosed by the triangles, by the NURBS faces, and of the exact wall: by the tube formula, or by
         quadrature where the lattice is graded.
+    area : float
+        In mm2, of the NURBS faces and side walls that the triangles stand for.
     deviation : float
         Largest distance between triangles and NURBS faces, in mm, as measured.
     volume_offset : float
@@ -100,6 +113,7 @@ class TriangleReport:
 
     cells: tuple[int, int, int]
     cell_size: float
+    cells_alike: bool
     thickness: float
     min_thickness: float
     max_thickness: float
@@ -114,6 +128,7 @@ class TriangleReport:
     volume: float
     volume_wall: float
     volume_exact: float
+    area: float
     deviation: float
     volume_offset: float
     seconds: dict[str, float]
@@ -121,6 +136,23 @@ class TriangleReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
         return asdict(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        fewest, most = (f"{steps} x {steps}" for steps in (self.fewest_steps, self.most_steps))
+        squares = most if fewest == most else f"{fewest} to {most}"
+        return [
+            ("cells", cells_shown(self.cells, self.cell_size, self.cells_alike)),
+            ("wall", wall_shown(self.thickness, self.min_thickness, self.max_thickness, self.density)),
+            ("triangles", f"{self.triangles:,} (closed), {squares} squares a patch and face"),
+            ("boundary edges, non-manifold edges", f"{self.boundary_edges}, {self.non_manifold_edges}"),
+            ("volume", volume_shown(self.volume, self.volume_exact)),
+            ("area", f"{self.area:.8g} mm2"),
+            ("deviation", f"{self.deviation:.2g} mm from the NURBS faces"),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
 
 def triangle_report(made: Triangles, thickness: float, density: float, volume_exact: float) -> TriangleReport:
@@ -137,6 +169,7 @@ def triangle_report(made: Triangles, thickness: float, density: float, volume_ex
     return TriangleReport(
         cells=fitted.spec.cells,
         cell_size=fitted.spec.grading.cell_size,
+        cells_alike=fitted.spec.grading.cells_alike,
         thickness=thickness,
         min_thickness=fitted.min_thickness if varies else thickness,
         max_thickness=fitted.max_thickness if varies else thickness,
@@ -151,6 +184,7 @@ def triangle_report(made: Triangles, thickness: float, density: float, volume_ex
         volume=triangulation.volume,
         volume_wall=fitted.wall.volume(),
         volume_exact=volume_exact,
+        area=fitted_areas(fitted.wall).total,
         deviation=triangulation.deviation,
         volume_offset=triangulation.volume_offset,
         seconds=dict(made.seconds),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gyroid_cad.cli.completion import answered_shell, completion_command
-from gyroid_cad.cli.console import print_built, print_check_table, print_table, shown_progress
+from gyroid_cad.cli.console import print_check_table, print_report, print_table, shown_progress
 from gyroid_cad.cli.doctor import doctor_command, version_option
 from gyroid_cad.cli.fill import fill_command
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, printed_options
@@ -120,7 +120,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_built(summary)
+        print_report(report.rows(), summary["files"], summary["seconds"]["total"])
         if check is not None:
             print_check_table(check)
 
@@ -147,23 +147,11 @@ def fit_report_command(control_points: int, as_json: bool) -> None:
     from gyroid_cad.surface.fit import FitSettings, fit_patch
     from gyroid_cad.surface.fit_report import fit_report
 
-    reports = {
-        "smooth": asdict(fit_report(fit_patch(FitSettings(control_points)))),
-        "paper": asdict(fit_report(fit_patch(FitSettings.paper()))),
-    }
+    ours, paper = (fit_report(fit_patch(settings)) for settings in (FitSettings(control_points), FitSettings.paper()))
     if as_json:
-        click.echo(json.dumps(reports))
+        click.echo(json.dumps({"smooth": asdict(ours), "paper": asdict(paper)}))
         return
-    labels = {
-        "max_distance": "largest distance along the normal / L",
-        "rms_distance": "rms distance along the normal / L",
-        "max_normal_angle": "largest angle between normals, degrees",
-        "max_mean_curvature": "largest mean curvature x L (exact: 0)",
-        "rms_mean_curvature": "rms mean curvature x L",
-        "edge_gap": "gap between an edge and its neighbour's / L",
-        "corner_error": "corners off by / L",
-    }
-    rows = [(label, *(f"{report[key]:.2e}" for report in reports.values())) for key, label in labels.items()]
+    rows = [(*row, beside) for row, (_, beside) in zip(ours.rows(), paper.rows(), strict=True)]
     print_table(("L is the cell size", f"ours ({control_points} x {control_points})", "the paper's (10 x 10)"), rows)
 
 

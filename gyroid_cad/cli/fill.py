@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.console import print_fill, shown_progress
+from gyroid_cad.cli.console import print_report, shown_progress
 from gyroid_cad.cli.lattice_options import density_of, porosity_option, require_one_wall, surface_option
 from gyroid_cad.cli.options import (
     angle_option,
@@ -110,7 +110,7 @@ def fill_command(
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_fill(summary)
+        print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
 
 
 def _face(opening: str) -> str | list[float]:

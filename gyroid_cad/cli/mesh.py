@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.console import print_mesh, print_table, print_volumes, shown_progress
+from gyroid_cad.cli.console import print_report, print_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options
 from gyroid_cad.cli.options import json_option, one_of, output_option, quiet_option
 from gyroid_cad.common.files import file_sizes, require_distinct
@@ -69,14 +69,14 @@ def mesh_command(
     gyroid-cad mesh -o shell.bdf --cells 2 2 2 --cell-size 10 --thickness 1 --subdivisions 8 --layers 0
     """
     start = time.perf_counter()
-    from gyroid_cad.mesh.finite_elements.files import require_mesh_format, write_mesh
+    from gyroid_cad.mesh.finite_elements.files import require_mesh_format
 
     if subdivisions is None:
         raise click.UsageError("Missing option '--subdivisions'.")
     lattice = lattice_of(given)
     if not output:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    targets = require_distinct(output, lambda path: require_mesh_format(path, full))
+    require_distinct(output, lambda path: require_mesh_format(path, full))
     if histogram is not None:
         from gyroid_cad.mesh.finite_elements.summaries import draw_quality, require_histogram
 
@@ -96,12 +96,11 @@ def mesh_command(
             from gyroid_cad.builds.meshes import mesh_quality
 
             measured = mesh_quality(made)
-        for target in targets:
-            with timed({}, f"write {target.name}", progress):
-                write_mesh(made, target, pairs, progress)
+        made.write(*output, pairs=pairs, progress=progress)
         if measured is not None and histogram is not None:
             draw_quality(measured, histogram)
-    files = [*output, *([histogram] if histogram else [])]
+    files = file_sizes([*output, *([histogram] if histogram else [])])
+    seconds = time.perf_counter() - start
     summary = {
         "element": made.element.name,
         "elements": len(made.cells),
@@ -112,17 +111,16 @@ def mesh_command(
         "sets": {name: len(some) for name, some in {**made.node_sets(), **made.element_sets()}.items()},
         "periodic_pairs": 0 if pairs is None else len(pairs),
         "quality": None if measured is None else measured.as_dict(),
-        "files": file_sizes(files),
-        "seconds": time.perf_counter() - start,
+        "files": files,
+        "seconds": seconds,
     }
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_mesh(summary)
+        rows = made.rows() if pairs is None else [*made.rows(), ("periodic pairs", f"{len(pairs):,}")]
+        print_report(rows, files, seconds)
         if measured is not None:
-            from gyroid_cad.mesh.finite_elements.summaries import quality_rows
-
-            print_table(*quality_rows(measured))
+            print_table(measured.header(), measured.rows())
 
 
 @click.command("volumes")
@@ -148,28 +146,26 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
     gyroid-cad volumes -o cell.mesh -o cell.xml --cells 1 1 1 --cell-size 10 --density 0.3 --degree 3
     """
     start = time.perf_counter()
-    from gyroid_cad.mesh.iga.files import write_volumes
 
     lattice = lattice_of(given)
     if not output:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    targets = require_formats(output, VOLUME_FORMATS)
+    require_formats(output, VOLUME_FORMATS)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.fitted(progress)
         with timed({}, "volumes", progress):
             made = lattice.volumes(degree)
-        for target in targets:
-            with timed({}, f"write {target.name}", progress):
-                write_volumes(made, target)
+        made.write(*output, progress=progress)
+    files, seconds = file_sizes(output), time.perf_counter() - start
     summary = {
         "patches": len(made),
         "degrees": list(made.degrees),
         "control_points": len(made.control_points),
         "interfaces": len(made.interfaces),
-        "files": file_sizes(output),
-        "seconds": time.perf_counter() - start,
+        "files": files,
+        "seconds": seconds,
     }
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
-        print_volumes(summary)
+        print_report(made.rows(), files, seconds)

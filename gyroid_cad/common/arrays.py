@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cross", "dot", "freeze_arrays"]
+__all__ = ["Point", "cross", "dot", "freeze_arrays"]
+
+# As users give it, and reports tell it.
+Point = tuple[float, float, float]
 
 
 def freeze_arrays(instance: Any) -> None:

@@ -9,6 +9,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, finite_numbers, positive_number, three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, Floats, as_field, call_text, compiled_field, derived, shown
@@ -27,8 +28,6 @@ __all__ = [
     "smooth_maximum",
     "smooth_minimum",
 ]
-
-Point = tuple[float, float, float]
 
 
 def constant(value: float) -> Field:

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyroid_cad.builds.solid import require_settings, write_shape
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
@@ -24,8 +26,7 @@ from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import topology
-from gyroid_cad.kernel.part import Part, require_part
-from gyroid_cad.kernel.selection import selected_faces
+from gyroid_cad.kernel.part import Part, require_part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.split import compound_of
@@ -42,7 +43,6 @@ from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 __all__ = ["FillReport", "Filled", "fill", "part_of"]
 
 Floats = NDArray[np.float64]
-Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +110,25 @@ class FillReport:
         """The report as plain values, ready for JSON."""
         return asdict(self)
 
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
+        of_part = f"{self.part_volume:.8g}, density {self.density:.5f}"
+        return [
+            ("kind", f"{self.kind}, cells of {self.cell_size:g} mm, wall {self.thickness:.6g} mm"),
+            *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
+            *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
+            ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
+            ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
+            ("area", f"{self.area:.6g} mm2"),
+            *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
+            ("islands", f"{self.islands} left, {self.dropped} dropped"),
+            *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filled(HostShapes):
@@ -141,15 +160,10 @@ class Filled(HostShapes):
         return shape_picture(self.solid(), *require_view(size, camera))
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
-        report = self.report
-        rows = [
-            ("kind", f"{report.kind}, cells of {report.cell_size:g} mm"),
-            ("solids, faces", f"{report.solids}, {report.faces}"),
-            ("volume", f"{report.volume:.5g} mm3 of {report.part_volume:.5g}, density {report.density:.4g}"),
-            ("surface", f"{report.area:.5g} mm2"),
-            *([] if report.mass is None else [("mass", f"{report.mass:.4g} g of {report.part_mass:.4g} g")]),
-        ]
-        return mime_bundle("filled part", lambda: rows, self.picture)
+        return mime_bundle("filled part", self.report.rows, self.picture)
+
+    def __str__(self) -> str:
+        return str(self.report)
 
     def write(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
@@ -28,7 +29,6 @@ from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
 __all__ = ["Filling", "Made", "Outcome"]
 
 Floats = NDArray[np.float64]
-Point = tuple[float, float, float]
 
 # Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
 _BOUNDARY_SPACING = 1 / 12

@@ -23,7 +23,7 @@ from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.split import inner_point
 
-__all__ = ["Depths", "Faces", "points_on"]
+__all__ = ["Depths", "FaceDistances", "points_on"]
 
 Floats = NDArray[np.float64]
 
@@ -39,8 +39,8 @@ _FOLLOWED, _TRIES, _ROUNDS, _REACH = 6, 24, 5, 0.4
 _ENOUGH = 1.2
 
 
-class Faces:
-    """Faces that points are away from.
+class FaceDistances:
+    """Distances of points from faces.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ class Depths:
     def __init__(self, solid: TopoDS_Solid, openings: Sequence[TopoDS_Face]) -> None:
         self._solid, self._openings = solid, list(openings)
         faces = parts_of(solid, TopAbs_FACE)
-        self.kept = Faces(face for face in faces if not any(face.IsSame(opening) for opening in openings))
-        self.opened = Faces(openings)
+        self.kept = FaceDistances(face for face in faces if not any(face.IsSame(opening) for opening in openings))
+        self.opened = FaceDistances(openings)
         self._random = np.random.default_rng(0)
 
     def deepest(self, enough: float) -> float:

@@ -32,7 +32,7 @@ from OCP.TopoDS import (
 )
 
 from gyroid_cad.kernel.compat import as_edge, as_face, as_vertex
-from gyroid_cad.kernel.region_split import NEW, Edge, Found, Piece, Task, all_of, place_of
+from gyroid_cad.kernel.region_split import NEW, Edge, Found, RegionPiece, Task, all_of, place_of
 from gyroid_cad.kernel.split import Pieces, changes, compound_of, general_fuse, modified, running_like
 
 __all__ = ["Joining"]
@@ -211,7 +211,7 @@ class Joining:
                 self.vertices[number] = as_vertex(image)
 
     def _face(
-        self, number: int, piece: Piece, on_boundary: dict[int, TopoDS_Edge], fuse: BOPAlgo_Builder | None
+        self, number: int, piece: RegionPiece, on_boundary: dict[int, TopoDS_Edge], fuse: BOPAlgo_Builder | None
     ) -> TopoDS_Face:
         """A piece of a face of the lattice, or the face itself if nothing of it has changed."""
         old = self.task.faces[piece.face]

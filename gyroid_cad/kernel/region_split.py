@@ -39,7 +39,7 @@ from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.split import compound_of, general_fuse, lies_in, modified
 
-__all__ = ["NEW", "Edge", "Finding", "Found", "Piece", "Task", "Values", "all_of", "map_of", "place_of"]
+__all__ = ["NEW", "Edge", "Found", "RegionPiece", "RegionSplit", "Task", "Values", "all_of", "map_of", "place_of"]
 
 Floats = NDArray[np.float64]
 Value = TypeVar("Value")
@@ -99,7 +99,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class RegionPiece:
     """A piece of a face, by the face's number, with each wire's edges by their numbers, and how they run."""
 
     face: int
@@ -122,7 +122,7 @@ class Found:
     moved : list of int
         For each of them, the number of the lattice's vertex it stands for, or ``NEW``.
     edges : list of Edge
-    pieces : list of Piece
+    pieces : list of RegionPiece
     supporting_faces : (list of int, list of int)
         Faces of the lattice, and of the part, on which the sections lie.
     shapes : bytes
@@ -132,7 +132,7 @@ class Found:
     points: list[tuple[float, float, float, float]]
     moved: list[int]
     edges: list[Edge]
-    pieces: list[Piece]
+    pieces: list[RegionPiece]
     supporting_faces: tuple[list[int], list[int]]
     shapes: bytes
 
@@ -155,7 +155,7 @@ class Values(Generic[Value]):
         return self._values[number - 1] if number else default
 
 
-class Finding:
+class RegionSplit:
     """A region's faces split against the part, and what is left of them described."""
 
     def __init__(self, task: Task, region: Sequence[int]) -> None:
@@ -219,13 +219,13 @@ class Finding:
                 origins.setdefault(image, numbers.FindIndex(shape) - 1)
         return origins
 
-    def _piece(self, number: int, piece: TopoDS_Face) -> Piece:
+    def _piece(self, number: int, piece: TopoDS_Face) -> RegionPiece:
         whole = bool(piece.IsSame(self.task.faces[number]))
         wires = tuple(
             tuple((self._edge(as_edge(edge), number), edge.Orientation()) for edge in parts_of(wire, TopAbs_EDGE))
             for wire in parts_of(piece.Oriented(TopAbs_FORWARD), TopAbs_WIRE)
         )
-        return Piece(number, piece.Orientation(), whole, wires)
+        return RegionPiece(number, piece.Orientation(), whole, wires)
 
     def _edge(self, edge: TopoDS_Edge, face: int) -> int:
         """The number of an edge of a piece of a face."""

@@ -25,7 +25,7 @@ from OCP.TopoDS import (
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.region_merge import Joining
-from gyroid_cad.kernel.region_split import Finding, Found, Task
+from gyroid_cad.kernel.region_split import Found, RegionSplit, Task
 from gyroid_cad.kernel.split import Pieces, split
 
 __all__ = ["split_by_region"]
@@ -142,7 +142,7 @@ def _begin(task: Task) -> None:
 def _found(number: int) -> Found:
     (task,) = _inherited
     with _kernel_errors():
-        return Finding(task, task.regions[number]).found()
+        return RegionSplit(task, task.regions[number]).found()
 
 
 @contextmanager

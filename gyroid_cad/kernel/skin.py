@@ -22,7 +22,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
-from gyroid_cad.kernel.depth import Depths, Faces, points_on
+from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.split import Change, Pieces, compound_of, inner_sides, modified, solids_of
@@ -152,7 +152,7 @@ def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
 
 
 def _lying_on(given: TopoDS_Shape, faces: Sequence[TopoDS_Face]) -> set[int]:
-    target = Faces([given])
+    target = FaceDistances([given])
     return {k for k, face in enumerate(faces) if all(target.distance(point) < _SAME_PLACE for point in _places(face))}
 
 

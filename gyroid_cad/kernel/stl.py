@@ -28,20 +28,15 @@ from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.solid import TOLERANCE
+from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners
+from gyroid_cad.mesh.triangles.triangulation import parting
 
-__all__ = ["diagonal", "meshed", "meshed_by_face", "write_stl"]
-
-# How far triangles that touch without belonging together are parted: a thousandth of the deviation, but
-# enough for the single-precision numbers of STL to tell them apart.
-_PARTING = 1e-3
-_SINGLE_PRECISION_STEPS = 8
-_HEADER_BYTES = 84
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+__all__ = ["diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
 
 
-def write_stl(
+def write_meshed_stl(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
 ) -> None:
     """Mesh a solid (``BRepMesh_IncrementalMesh``) and write it as binary STL, in millimetres.
@@ -110,16 +105,10 @@ def meshed_by_face(
     with TemporaryDirectory() as folder:
         file = Path(folder) / "triangles.stl"
         _write(copy, file, path)
-        records = np.fromfile(file, _RECORD, offset=_HEADER_BYTES)
-    # Minus zero is zero.
-    corners: NDArray[np.float32] = records["corners"].reshape(-1, 3) + np.float32(0)
-    vertices, numbers = np.unique(corners, axis=0, return_inverse=True)
-    triangles = numbers.reshape(-1, 3).astype(np.int32)
-    # What single precision makes of slivers bounds nothing.
-    slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
+        vertices, triangles, kept = numbered_corners(binary_stl_corners(file))
     # The kernel writes them face by face.
     counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
-    return vertices, triangles[~slivers], np.repeat(np.arange(len(counts)), counts)[~slivers]
+    return vertices, triangles.astype(np.int32), np.repeat(np.arange(len(counts)), counts)[kept]
 
 
 def _triangle_count(face: TopoDS_Shape) -> int:
@@ -159,9 +148,7 @@ def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
     TopExp.MapShapesAndAncestors_s(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex)
     points = [BRep_Tool.Pnt_s(as_vertex(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)]
     positions = np.array([(p.X(), p.Y(), p.Z()) for p in points])
-    distance = max(
-        _PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * float(np.abs(positions).max())
-    )
+    distance = parting(deviation, float(np.abs(positions).max()))
     touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
     for vertex in touching.tolist():
         # A face used by two edges at the vertex is listed twice.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
+from gyroid_cad.common.tables import text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import read_triangles
@@ -113,9 +114,26 @@ class PrintCheck:
         judged = {name: getattr(self, name) for name in ("passed", "fits", "wall", "drains", "suggested_scale")}
         return {**asdict(self), **judged}
 
+    def header(self) -> tuple[str, str, str]:
+        """Headings of the rows: the printer over the first of them."""
+        return f"{self.printer.name}, {self.printer.process}", "", ""
+
     def rows(self) -> list[tuple[str, str, str]]:
-        """Subject, finding and verdict, for a table."""
+        """Subject, finding and verdict, line by line."""
         return [self._fit_row(), self._wall_row(), *self._drain_rows(), *self._whole_rows()]
+
+    def __str__(self) -> str:
+        return text_table([*self.rows(), self.verdict_row()], self.header())
+
+    def verdict_row(self) -> tuple[str, str, str]:
+        """What follows from all the rows, as one more of them."""
+        scale = self.suggested_scale
+        if self.passed:
+            return "verdict", "can be printed", "passed"
+        if scale is not None and scale != 1:
+            return "verdict", f"cannot be printed as it is; suggested scale {scale:.4g}", "failed"
+        at_none = "" if scale else ", at no scale: what fits has too thin a wall"
+        return "verdict", f"cannot be printed as it is{at_none}", "failed"
 
     def _fit_row(self) -> tuple[str, str, str]:
         volume = " x ".join(f"{length:g}" for length in self.printer.build_volume)

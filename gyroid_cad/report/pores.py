@@ -25,7 +25,7 @@ from gyroid_cad.wall.fitted import FittedWall
 from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.refit import graded_wall
 
-__all__ = ["CONTINUED", "ENDLESS", "OPEN", "ChannelSpheres", "Pores", "inscribed_spheres", "pores_of"]
+__all__ = ["CONTINUED", "ENDLESS", "OPEN_SIDED", "ChannelSpheres", "Pores", "inscribed_spheres", "pores_of"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -53,7 +53,7 @@ _BEYOND = 0.75
 _REACH = 0.25
 # How far beyond the block the centres of spheres that reach into it are looked for, in cell sizes.
 _CENTRES_BEYOND = 0.3
-ENDLESS, CONTINUED, OPEN = "endless", "continued", "open"
+ENDLESS, CONTINUED, OPEN_SIDED = "endless", "continued", "open"
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +182,7 @@ def _scene(fitted: FittedWall) -> tuple[_Grid, WallFaces, str]:
     try:
         return _grid(fitted, _CENTRES_BEYOND), wall_faces(_continued(fitted), None), CONTINUED
     except ParameterError:
-        return _grid(fitted, 0.0), wall_faces(wall, None), OPEN
+        return _grid(fitted, 0.0), wall_faces(wall, None), OPEN_SIDED
 
 
 def _continued(fitted: FittedWall) -> Wall:

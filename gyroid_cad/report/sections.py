@@ -23,10 +23,11 @@ from gyroid_cad.printing.printers import printer_named
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_wall
 from gyroid_cad.report.file_sections import FileContents, file_section, read_contents
 from gyroid_cad.report.pores import ChannelSpheres, pores_of
-from gyroid_cad.report.wall_thickness import exact_areas, fitted_areas, wall_thickness
+from gyroid_cad.report.wall_thickness import wall_thickness
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.version import __version__
+from gyroid_cad.wall.areas import distinct_patches, exact_areas, fitted_areas
 
 __all__ = [
     "FILE_SECTIONS",
@@ -221,10 +222,9 @@ def measures_section(subject: Subject) -> Values:
     }
     if lattice.trim:
         return values | _trimmed_measures(lattice)
-    areas, rim = fitted_areas(fitted)
-    exact = exact_areas(fitted)
+    areas = fitted_areas(fitted.wall)
+    exact = exact_areas(fitted.complex, fitted.spec.grading, *distinct_patches(fitted.wall))
     volume = fitted.wall.volume()
-    faces, faces_exact = areas.face_a + areas.face_b, exact.face_a + exact.face_b
     return values | {
         "pieces": fitted.complex.component_count,
         "boundary_edges": int(fitted.complex.free.sum()),
@@ -234,13 +234,13 @@ def measures_section(subject: Subject) -> Values:
         "volume_error": volume / lattice.exact_volume - 1,
         "face_a_area": areas.face_a,
         "face_b_area": areas.face_b,
-        "faces_area": faces,
-        "faces_area_exact": faces_exact,
-        "faces_area_error": faces / faces_exact - 1,
-        "rim_area": rim,
-        "area": faces + rim,
-        "area_per_volume": (faces + rim) / volume,
-        "faces_area_per_block_volume": faces_exact / block,
+        "faces_area": areas.faces,
+        "faces_area_exact": exact.faces,
+        "faces_area_error": areas.faces / exact.faces - 1,
+        "rim_area": areas.rim,
+        "area": areas.total,
+        "area_per_volume": areas.total / volume,
+        "faces_area_per_block_volume": exact.faces / block,
     }
 
 

@@ -11,18 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from gyroid_cad.common.arrays import dot, freeze_arrays
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.nurbs.surface import grid_derivatives
+from gyroid_cad.wall.areas import distinct_patches
 from gyroid_cad.wall.exact import differentiation_matrix, offset_patches
 from gyroid_cad.wall.fitted import FittedWall
-from gyroid_cad.wall.offset import SIDES
 
 __all__ = [
     "BINS",
     "Distribution",
-    "FaceAreas",
     "WallThickness",
     "distribution_of",
-    "exact_areas",
-    "fitted_areas",
     "wall_thickness",
 ]
 
@@ -103,8 +100,7 @@ def _range(low: float, high: float) -> tuple[float, float]:
 
 Integers = NDArray[np.int64]
 
-# Gauss points along each side of a patch: of what is integrated exactly, and of what is counted, so many in all.
-_QUADRATURE_POINTS = 16
+# Gauss points along each side of a patch, so many in all.
 _FEWEST_MEASURED, _MOST_MEASURED, _MEASURED = 8, 48, 200_000
 # In mm to micrometres.
 _MICRO = 1e3
@@ -126,20 +122,6 @@ class WallThickness:
     error: Distribution
 
 
-@dataclass(frozen=True, slots=True)
-class FaceAreas:
-    """Areas in mm2 of surfaces of a wall.
-
-    Attributes
-    ----------
-    face_a, face_b : float
-        Towards the network that the common normal points to, and towards the other.
-    """
-
-    face_a: float
-    face_b: float
-
-
 def wall_thickness(fitted: FittedWall) -> WallThickness:
     """Measure the wall along the normals of the exact mid-surface, to where they meet the two fitted faces.
 
@@ -155,7 +137,7 @@ def wall_thickness(fitted: FittedWall) -> WallThickness:
     WallThickness
     """
     grading, wall = fitted.spec.grading, fitted.wall
-    patches = _told_apart(fitted)
+    patches, _ = distinct_patches(fitted.wall)
     along = int(np.clip(np.sqrt(_MEASURED / len(patches)), _FEWEST_MEASURED, _MOST_MEASURED))
     nodes, gauss = np.polynomial.legendre.leggauss(along)
     rate, shape = differentiation_matrix(nodes), (-1, along, along)
@@ -185,58 +167,3 @@ def wall_thickness(fitted: FittedWall) -> WallThickness:
         distribution_of(thickness[counted], weight[counted]),
         distribution_of((thickness - wanted)[counted] * _MICRO, weight[counted]),
     )
-
-
-def exact_areas(fitted: FittedWall) -> FaceAreas:
-    """Areas of the exact wall's faces, by quadrature; patches are analytic, so it converges faster than any power."""
-    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
-    rate, shape = differentiation_matrix(nodes), (-1, len(nodes), len(nodes), 3)
-    patches = _told_apart(fitted)
-    uses = _uses(fitted, patches)
-    totals = np.zeros(2)
-    for some, exact in offset_patches(fitted.complex, fitted.spec.grading, nodes, patches):
-        offset = exact.normals * (exact.thickness / 2)[:, np.newaxis]
-        for side in SIDES:
-            face = (exact.points + (2 * side - 1) * offset).reshape(shape)
-            along_u, along_v = np.einsum("ab,pbvc->pavc", rate, face), np.einsum("ab,pubc->puac", rate, face)
-            area = np.linalg.norm(np.cross(along_u, along_v), axis=-1)
-            totals[side] += float(np.einsum("p,u,v,puv->", uses[some], weights, weights, area))
-    return FaceAreas(face_a=float(totals[1]), face_b=float(totals[0]))
-
-
-def fitted_areas(fitted: FittedWall) -> tuple[FaceAreas, float]:
-    """Areas of the fitted faces, and of the free side walls that close the lattice's rim, in mm2, by quadrature."""
-    wall, complex = fitted.wall, fitted.complex
-    u, v, weights = wall.face(0, 0).quadrature()
-    uses = np.bincount(wall.patch_net, minlength=len(wall.nets))
-    totals = np.zeros(2)
-    for first in range(0, len(wall.nets), 64):
-        some = slice(first, first + 64)
-        _, du, dv = grid_derivatives(wall.nets[some], wall.weights, (wall.knots, wall.knots), u.ravel(), v.ravel())
-        area = np.linalg.norm(np.cross(du, dv), axis=-1)
-        totals += np.einsum("p,uv,psuv->s", uses[some], weights, area)
-    patches = complex.edge_patches[complex.free, 0]
-    edges = np.argmax(complex.patch_edges[patches] == np.flatnonzero(complex.free)[:, np.newaxis], axis=1)
-    kinds, counts = np.unique(np.stack([wall.patch_net[patches], edges]), axis=1, return_counts=True)
-    rim = sum(
-        count * _area_of_side_wall(fitted, net, edge)
-        for (net, edge), count in zip(kinds.T.tolist(), counts.tolist(), strict=True)
-    )
-    return FaceAreas(face_a=float(totals[1]), face_b=float(totals[0])), float(rim)
-
-
-def _area_of_side_wall(fitted: FittedWall, net: int, edge: int) -> float:
-    surface = fitted.wall.side_wall(net, edge)
-    u, v, weights = surface.quadrature()
-    both = surface.derivatives(u, v)
-    return float(np.sum(weights * np.linalg.norm(np.cross(both[1, 0], both[0, 1]), axis=-1)))
-
-
-def _told_apart(fitted: FittedWall) -> Integers:
-    """One of the patches that are alike."""
-    return np.asarray(np.unique(fitted.wall.patch_net, return_index=True)[1], dtype=np.int64)
-
-
-def _uses(fitted: FittedWall, patches: Integers) -> Integers:
-    counts = np.bincount(fitted.wall.patch_net, minlength=len(fitted.wall.nets))
-    return np.asarray(counts[fitted.wall.patch_net[patches]])

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.surface.fit import (
     CELL_SIZE,
@@ -39,6 +40,22 @@ class FitReport:
     rms_mean_curvature: float
     edge_gap: float
     corner_error: float
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed; L is the cell size."""
+        found = {
+            "largest distance along the normal / L": self.max_distance,
+            "rms distance along the normal / L": self.rms_distance,
+            "largest angle between normals, degrees": self.max_normal_angle,
+            "largest mean curvature x L (exact: 0)": self.max_mean_curvature,
+            "rms mean curvature x L": self.rms_mean_curvature,
+            "gap between an edge and its neighbour's / L": self.edge_gap,
+            "corners off by / L": self.corner_error,
+        }
+        return [(subject, f"{value:.2e}") for subject, value in found.items()]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())
 
 
 @lru_cache(maxsize=32)

@@ -34,7 +34,7 @@ __all__ = [
 Integers = NDArray[np.int64]
 # p -> M p + m, in quarters.
 Isometry = tuple[Integers, Integers]
-Corners = tuple[tuple[int, int, int], ...]
+QuarterCorners = tuple[tuple[int, int, int], ...]
 
 QUARTER = 0.25
 CELL_QUARTERS = 8
@@ -67,7 +67,7 @@ class Patch:
     """
 
     family: Family
-    corners: Corners
+    corners: QuarterCorners
     neighbour: Neighbour
     mirror: tuple[int, int, int] | None = None
 

@@ -15,7 +15,7 @@ from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.caps import Cap, CapArc, caps_of
-from gyroid_cad.trim.edge_crossings import PLANES, Faces
+from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 from gyroid_cad.trim.sections import Sections
 from gyroid_cad.trim.trimmed_faces import CORNER, RIM, Arc, CutFace, Node, cut_faces
 from gyroid_cad.wall.offset import Wall
@@ -212,7 +212,7 @@ class _Assembly:
         patches = np.flatnonzero(~outside & near)
         template, nets, distinct = _alike(self.wall.patch_net[patches], levels[patches], _SAME_LEVEL * self.cell_size)
         self.distinct += len(nets)
-        cut = cut_faces(Faces(self.nets[nets, side], self.wall.weights, self.wall.knots, distinct), self.cell_size)
+        cut = cut_faces(FacesToCut(self.nets[nets, side], self.wall.weights, self.wall.knots, distinct), self.cell_size)
         for patch, index in zip(patches.tolist(), template.tolist(), strict=True):
             self._add_cut(patch, side, cut[index], backwards)
 

@@ -23,8 +23,8 @@ __all__ = ["Cap", "CapArc", "caps_of", "plane_axes"]
 
 Floats = NDArray[np.float64]
 
-Corner = tuple[int, int, int]
-End = int | Corner
+BoxCorner = tuple[int, int, int]
+End = int | BoxCorner
 Straight = Callable[[tuple[End, End]], int]
 
 
@@ -151,7 +151,7 @@ class _Run:
 
 def _filled_runs(arcs: list[list[CapArc]], low: Floats, high: Floats, filled: bool) -> list[_Run]:
     stops = {planes: _stops(arcs, planes) for planes in _box_edges()}
-    inside: dict[Corner, bool] = {}
+    inside: dict[BoxCorner, bool] = {}
     for planes, on_edge in stops.items():
         if on_edge:
             corners = _corners_of(planes)
@@ -172,7 +172,7 @@ def _filled_runs(arcs: list[list[CapArc]], low: Floats, high: Floats, filled: bo
 def _runs_along(
     planes: tuple[int, int],
     stops: list[tuple[int, Floats, bool]],
-    inside: dict[Corner, bool],
+    inside: dict[BoxCorner, bool],
     box: tuple[Floats, Floats],
 ) -> list[_Run]:
     lowest, highest = _corners_of(planes)
@@ -243,7 +243,7 @@ def _straight_link(run: _Run, plane: int, straight: Straight) -> _Link:
     return _Link(edge, upwards, start, end, run.points if upwards else run.points[::-1], 0.0)
 
 
-def _agree(inside: dict[Corner, bool], corner: Corner, value: bool) -> None:
+def _agree(inside: dict[BoxCorner, bool], corner: BoxCorner, value: bool) -> None:
     if inside.setdefault(corner, value) != value:
         raise KernelError("curves where the lattice crosses the box do not agree at one of its corners")
 
@@ -257,7 +257,7 @@ def _free_axis(planes: tuple[int, int]) -> int:
     return 3 - PLANES[planes[0]][0] - PLANES[planes[1]][0]
 
 
-def _corners_of(planes: tuple[int, int]) -> tuple[Corner, Corner]:
+def _corners_of(planes: tuple[int, int]) -> tuple[BoxCorner, BoxCorner]:
     """The ends of an edge of the box: 0 or 1 along each axis."""
     place = [0, 0, 0]
     for plane in planes:

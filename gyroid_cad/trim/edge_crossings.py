@@ -14,7 +14,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.roots import roots
 from gyroid_cad.nurbs.surface import basis
 
-__all__ = ["AXES", "PLANES", "EdgeCrossings", "Faces", "edge_crossings", "plane_heights", "square_points"]
+__all__ = ["AXES", "PLANES", "EdgeCrossings", "FacesToCut", "edge_crossings", "plane_heights", "square_points"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -33,7 +33,7 @@ _TOUCHING = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Faces:
+class FacesToCut:
     """Faces of the wall, in coordinates along a box's axes, and the planes that come near them.
 
     Attributes
@@ -54,10 +54,10 @@ class Faces:
     def __len__(self) -> int:
         return len(self.nets)
 
-    def chunk(self, first: int, count: int) -> Faces:
+    def chunk(self, first: int, count: int) -> FacesToCut:
         """Some of the faces."""
         chosen = slice(first, first + count)
-        return Faces(self.nets[chosen], self.weights, self.knots, self.levels[chosen])
+        return FacesToCut(self.nets[chosen], self.weights, self.knots, self.levels[chosen])
 
     def derivatives(self, which: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
         """Points and first derivatives of chosen faces (A4.4), extended past the square's sides.
@@ -142,7 +142,7 @@ def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:
     return u, v
 
 
-def edge_crossings(faces: Faces) -> EdgeCrossings:
+def edge_crossings(faces: FacesToCut) -> EdgeCrossings:
     """Find the crossings of faces' sides with the planes near them.
 
     Raises
@@ -175,7 +175,7 @@ def edge_crossings(faces: Faces) -> EdgeCrossings:
     return EdgeCrossings(face[order], side[order], plane[order], along[order], (across > 0)[order])
 
 
-def plane_heights(faces: Faces, face: Integers, plane: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+def plane_heights(faces: FacesToCut, face: Integers, plane: Integers, u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Heights above one plane each, shape of u and v, (m,) or (m, q); and their slopes along u and v, (..., 2)."""
     flat = u.ndim == 1
     if flat:

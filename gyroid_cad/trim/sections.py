@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.surface import basis
-from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, Faces, plane_heights
+from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, FacesToCut, plane_heights
 
 __all__ = ["Sections", "plane_sections", "section_knots"]
 
@@ -94,12 +94,12 @@ def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
     return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
 
 
-def plane_sections(faces: Faces, crossings: EdgeCrossings, size: float) -> Sections:
+def plane_sections(faces: FacesToCut, crossings: EdgeCrossings, size: float) -> Sections:
     """The curves between the crossings of the sides.
 
     Parameters
     ----------
-    faces : Faces
+    faces : FacesToCut
     crossings : EdgeCrossings
     size : float
         Of a cell in mm, by which closeness is measured.
@@ -123,7 +123,7 @@ def plane_sections(faces: Faces, crossings: EdgeCrossings, size: float) -> Secti
     return _fitted_closely(faces, crossings, starts, ends, ways, size)
 
 
-def _require_open_curves(faces: Faces) -> None:
+def _require_open_curves(faces: FacesToCut) -> None:
     """Wherever a face lies above a plane, or below, one can go on doing so to a side of the square."""
     face, plane = np.nonzero(~np.isnan(faces.levels))
     through = basis(faces.knots, 3, np.linspace(-1, 1, _GRID))
@@ -142,7 +142,7 @@ def _require_open_curves(faces: Faces) -> None:
         raise KernelError("a face of the lattice bulges through a side of the box")
 
 
-def _followed(faces: Faces, crossings: EdgeCrossings, starts: Integers, step: float) -> list[Floats]:
+def _followed(faces: FacesToCut, crossings: EdgeCrossings, starts: Integers, step: float) -> list[Floats]:
     """Places along the curve from each start until it has left the square, the last one outside."""
     place = crossings.places[starts]
     paths = [[point] for point in place]
@@ -162,7 +162,7 @@ def _followed(faces: Faces, crossings: EdgeCrossings, starts: Integers, step: fl
     return [np.array(path) for path in paths]
 
 
-def _along(faces: Faces, face: Integers, plane: Integers, place: Floats) -> Floats:
+def _along(faces: FacesToCut, face: Integers, plane: Integers, place: Floats) -> Floats:
     """The unit direction that keeps what is higher on its left."""
     slopes = plane_heights(faces, face, plane, *place.T)[1]
     turned = np.stack([slopes[:, 1], -slopes[:, 0]], axis=-1)
@@ -200,7 +200,7 @@ def _exits(crossings: EdgeCrossings, starts: Integers, paths: list[Floats], reac
 
 
 def _fitted_closely(
-    faces: Faces, crossings: EdgeCrossings, starts: Integers, ends: Integers, ways: list[Floats], size: float
+    faces: FacesToCut, crossings: EdgeCrossings, starts: Integers, ends: Integers, ways: list[Floats], size: float
 ) -> Sections:
     """Each curve with as few control points as keep the one in the square and the one in space together."""
     face, plane = crossings.face[starts], crossings.plane[starts]
@@ -222,7 +222,7 @@ def _fitted_closely(
 
 
 def _fitted(
-    faces: Faces, face: Integers, plane: Integers, ways: list[Floats], count: int
+    faces: FacesToCut, face: Integers, plane: Integers, ways: list[Floats], count: int
 ) -> tuple[Floats, Floats, Floats]:
     """Control points in the square and in space, and how far the two curves are from each other."""
     even = np.linspace(0, 1, count + 1)
@@ -248,7 +248,7 @@ def _fitted(
     return control[..., :2], control[..., 2:], np.where(crowded | astray, np.inf, deviation)
 
 
-def _onto_level(faces: Faces, face: Integers, plane: Integers, stations: Floats) -> Floats:
+def _onto_level(faces: FacesToCut, face: Integers, plane: Integers, stations: Floats) -> Floats:
     """Move stations between the ends onto the level curve, in place; their points in space."""
     for _ in range(_NEWTON_STEPS):
         step = _towards(*plane_heights(faces, face, plane, stations[..., 0], stations[..., 1]))

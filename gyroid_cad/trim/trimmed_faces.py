@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.nurbs.roots import roots
 from gyroid_cad.nurbs.surface import gauss_points
-from gyroid_cad.trim.edge_crossings import PLANES, EdgeCrossings, Faces, edge_crossings, square_points
+from gyroid_cad.trim.edge_crossings import PLANES, EdgeCrossings, FacesToCut, edge_crossings, square_points
 from gyroid_cad.trim.loops import linked, nested
 from gyroid_cad.trim.sections import Sections, plane_sections
 
-__all__ = ["Arc", "CutFace", "Node", "Piece", "cut_faces"]
+__all__ = ["Arc", "CutFace", "FacePiece", "Node", "cut_faces"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -65,7 +65,7 @@ class Arc:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Piece:
+class FacePiece:
     """One connected remainder of a face.
 
     Attributes
@@ -92,7 +92,7 @@ class CutFace:
 
     Attributes
     ----------
-    pieces : list of Piece
+    pieces : list of FacePiece
     sections : Sections
         Holds the section curves of this face and of others.
     curves : list of int
@@ -107,7 +107,7 @@ class CutFace:
         Points along the arcs of section curves, in mm; shape (k, 3).
     """
 
-    pieces: list[Piece]
+    pieces: list[FacePiece]
     sections: Sections
     curves: list[int]
     crossings: list[int]
@@ -133,12 +133,12 @@ class CutFace:
         return float(weights @ (place[:, 0] * rate[:, 1] - place[:, 1] * rate[:, 0])) / 2
 
 
-def cut_faces(faces: Faces, size: float) -> list[CutFace]:
+def cut_faces(faces: FacesToCut, size: float) -> list[CutFace]:
     """Cut faces to a box.
 
     Parameters
     ----------
-    faces : Faces
+    faces : FacesToCut
     size : float
         Of a cell, in mm.
 
@@ -163,7 +163,7 @@ def cut_faces(faces: Faces, size: float) -> list[CutFace]:
 class _Cutting:
     """Some faces, where their sides cross the planes, and their section curves."""
 
-    def __init__(self, faces: Faces, crossings: EdgeCrossings, sections: Sections) -> None:
+    def __init__(self, faces: FacesToCut, crossings: EdgeCrossings, sections: Sections) -> None:
         self.faces, self.crossings, self.sections = faces, crossings, sections
         self.curves: list[list[int]] = [[] for _ in range(len(faces))]
         for curve, face in enumerate(sections.face.tolist()):
@@ -308,7 +308,7 @@ class _Cutting:
 
     def _measured(
         self, curves: list[int], loops: list[list[Arc]], quadrature: SquareQuadrature, density: Floats
-    ) -> Piece:
+    ) -> FacePiece:
         places, rates = [np.zeros((0, 2))], [np.zeros(0)]
         for arc in (arc for loop in loops for arc in loop):
             # By Green's theorem, with an antiderivative along u that is 0 at u = -1: the other sides add nothing.
@@ -320,7 +320,7 @@ class _Cutting:
             rate = 1.0 if arc.curve < 0 else self.sections.in_square(curves[arc.curve], t, 1)[:, 1]
             rates.append(weights * rate)
         total = quadrature.over(np.concatenate(places), np.concatenate(rates), density)
-        return Piece(loops, float(total[0]), total[1:4], float(total[4]))
+        return FacePiece(loops, float(total[0]), total[1:4], float(total[4]))
 
 
 def _stretches(side: int, curve: int, stops: list[float], nodes: list[Node]) -> list[Arc]:

@@ -79,6 +79,11 @@ class Grading:
         return not isinstance(self.thickness, Field | None) and self.scale_field is None and self.map is None
 
     @property
+    def cells_alike(self) -> bool:
+        """True where every cell has the size and shape of every other, whatever its wall."""
+        return self.scale_field is None and self.map is None
+
+    @property
     def map_closes(self) -> tuple[bool, bool, bool]:
         """Along which axes the map would join the ends of a block."""
         return OPEN if self.map is None else self.map.closed

@@ -29,8 +29,9 @@ from gyroid_cad.surface.fit_report import fit_report
 Captured = pytest.CaptureFixture[str]
 
 KEYS = [
-    *("cells", "cell_size", "thickness", "min_thickness", "max_thickness", "density", "patches", "faces", "solids"),
-    *("control_points", "valid", "closed", "boundary_edges", "non_manifold_edges", "volume", "volume_exact"),
+    *("cells", "cell_size", "cells_alike", "thickness", "min_thickness", "max_thickness", "density"),
+    *("patches", "faces", "solids", "control_points", "valid", "closed"),
+    *("boundary_edges", "non_manifold_edges", "volume", "volume_exact", "area"),
     *("max_deviation", "max_wall_error", "max_normal_angle", "samples_per_patch", "seconds", "files"),
 ]
 ONE_CELL = ["--cells", "1", "1", "1", "--cell-size", "10"]

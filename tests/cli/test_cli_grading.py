@@ -58,9 +58,12 @@ def test_the_papers_units_are_those_of_lattice_paper(capsys: Captured, tmp_path:
 def test_the_table_shows_the_range_of_the_wall_and_what_the_fit_took(capsys: Captured, tmp_path: Path) -> None:
     done = run(capsys, "-o", tmp_path / "a.brep", *ONE_CELL, "--thickness", "0.6 + 0.02*x", *COARSE)
     report = Lattice((1, 1, 1), 10.0, "0.6 + 0.02*x", fit=FitSettings(6), tolerance=0.01).report()
-    assert f"{report.min_thickness:.4g} to {report.max_thickness:.4g}" in done.out
-    assert f"{report.control_points} x {report.control_points} control points a patch" in done.out
-    assert "289 for folding" in done.out
+    assert f"{report.min_thickness:.4g} to {report.max_thickness:.4g}" in str(report)
+    assert f"{report.control_points} x {report.control_points} control points a patch" in str(report)
+    assert "289 for local self-intersection" in str(report)
+    # The terminal shows the same lines, and below them the files and the time.
+    shown = [" ".join(line.split()) for line in done.out.splitlines()]
+    assert shown[: len(report.rows())] == [" ".join(row) for row in report.rows()]
 
 
 def test_a_file_holds_a_whole_lattice_and_builds_it(capsys: Captured, tmp_path: Path) -> None:

@@ -55,6 +55,8 @@ def test_a_filled_part_is_closed_valid_and_what_its_report_says(kind: str, densi
     assert measure(made.solid()) == pytest.approx((report.volume, report.area), rel=1e-8)
     assert report.part_volume == pytest.approx(BALL, rel=1e-6)
     assert report.density == pytest.approx(report.volume / report.part_volume)
+    assert f"{report.kind}, cells of {report.cell_size:g} mm" in str(made)
+    assert f"{report.area:.6g} mm2" in str(made)
     assert report.mass == pytest.approx(2.7e-3 * report.volume)
     assert report.part_mass == pytest.approx(2.7e-3 * report.part_volume)
 

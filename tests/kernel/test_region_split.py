@@ -169,7 +169,7 @@ def test_what_goes_wrong_in_a_process_is_an_error_of_the_kernel(
     happens: Callable[..., NoReturn], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part, cut, _ = subject("ball")
-    monkeypatch.setattr(region_split.Finding, "found", happens)
+    monkeypatch.setattr(region_split.RegionSplit, "found", happens)
     with pytest.raises(KernelError, match=said):
         split_by_region(part, cut, 2)
 

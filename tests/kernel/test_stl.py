@@ -21,7 +21,7 @@ from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.kernel.check import enclosed_volume
 from gyroid_cad.kernel.stl import meshed as triangles_of
-from gyroid_cad.kernel.stl import write_stl
+from gyroid_cad.kernel.stl import write_meshed_stl
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.offset import SIDES
@@ -38,7 +38,7 @@ def fine_cell() -> Lattice:
 
 def meshed(lattice: Lattice, folder: Path, deviation: float, angle: float = DEFAULT_ANGLE) -> trimesh.Trimesh:
     path = folder / "part.stl"
-    write_stl(lattice.solid(), path, deviation, angle)
+    write_meshed_stl(lattice.solid(), path, deviation, angle)
     return trimesh.load_mesh(path)
 
 
@@ -84,7 +84,7 @@ def test_a_mesh_far_from_the_origin_is_closed_though_stl_counts_in_single_precis
     """What parts the touching triangles must be larger than what single precision can tell apart there."""
     lattice, move = Lattice((2, 1, 1), 10.0, 0.8, fit=FitSettings(5)), gp_Trsf()
     move.SetTranslation(gp_Vec(20_000, -26_000, 14_000))
-    write_stl(lattice.solid().Moved(TopLoc_Location(move)), tmp_path / "far.stl", 0.02)
+    write_meshed_stl(lattice.solid().Moved(TopLoc_Location(move)), tmp_path / "far.stl", 0.02)
     mesh = trimesh.load_mesh(tmp_path / "far.stl")
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
@@ -143,12 +143,12 @@ def test_the_triangles_as_arrays_are_those_of_the_file_with_their_corners_number
 
 def test_meshing_leaves_the_solid_without_triangles(fine_cell: Lattice, tmp_path: Path) -> None:
     solid = fine_cell.solid()
-    write_stl(solid, tmp_path / "part.stl", 0.1)
+    write_meshed_stl(solid, tmp_path / "part.stl", 0.1)
     assert not BRepTools.Triangulation_s(solid, 1e9)
 
 
 def test_the_file_is_binary_and_its_normals_follow_the_right_hand_rule(fine_cell: Lattice, tmp_path: Path) -> None:
-    write_stl(fine_cell.solid(), tmp_path / "part.stl", 0.1)
+    write_meshed_stl(fine_cell.solid(), tmp_path / "part.stl", 0.1)
     data = (tmp_path / "part.stl").read_bytes()
     (count,) = struct.unpack_from("<I", data, 80)
     assert len(data) == 84 + 50 * count
@@ -168,7 +168,7 @@ def test_a_deviation_that_is_no_length_is_refused_and_writes_nothing(
     fine_cell: Lattice, tmp_path: Path, deviation: float
 ) -> None:
     with pytest.raises(ParameterError, match=rf"deviation = {deviation}: expected a length above 0 mm"):
-        write_stl(fine_cell.solid(), tmp_path / "part.stl", deviation)
+        write_meshed_stl(fine_cell.solid(), tmp_path / "part.stl", deviation)
     assert not list(tmp_path.iterdir())
 
 
@@ -184,6 +184,6 @@ def test_a_disk_that_fills_up_leaves_the_older_file_and_nothing_else(
     path = tmp_path / "part.stl"
     path.write_text("older")
     with disk_full(10_000), pytest.raises(ExportError, match=r"part\.stl was not written"):
-        write_stl(cell.solid(), path, 0.1)
+        write_meshed_stl(cell.solid(), path, 0.1)
     assert path.read_text() == "older"
     assert list(tmp_path.iterdir()) == [path]

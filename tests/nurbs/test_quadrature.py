@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.nurbs.surface import uniform_knots
-from gyroid_cad.trim.edge_crossings import Faces
+from gyroid_cad.trim.edge_crossings import FacesToCut
 
 Floats = NDArray[np.float64]
 

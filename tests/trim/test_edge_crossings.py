@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.trim.edge_crossings import AXES, PLANES, Faces, edge_crossings, square_points
+from gyroid_cad.trim.edge_crossings import AXES, PLANES, FacesToCut, edge_crossings, square_points
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import Wall, build_wall
 
@@ -33,7 +33,7 @@ def wall(rational: bool) -> Wall:
     return build_wall(build_complex((1, 1, 1)), fit_patch(fit), L, 0.8)
 
 
-def cell_faces(level: float, side: int, rational: bool = False) -> Faces:
+def cell_faces(level: float, side: int, rational: bool = False) -> FacesToCut:
     """One cell's faces on one side, and planes of one level along x, y, z to keep above."""
     made = wall(rational)
     nets = made.nets[made.patch_net, side] + made.shifts[made.patch_shift][:, np.newaxis, np.newaxis]
@@ -41,7 +41,7 @@ def cell_faces(level: float, side: int, rational: bool = False) -> Faces:
     for plane, (axis, sign) in enumerate(PLANES):
         crossed = (nets[..., axis].min(axis=(1, 2)) < level) & (nets[..., axis].max(axis=(1, 2)) > level)
         near[crossed & (sign > 0), plane] = level
-    return Faces(nets, made.weights, made.knots, near)
+    return FacesToCut(nets, made.weights, made.knots, near)
 
 
 @settings(max_examples=15)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.edge_crossings import Faces, edge_crossings, plane_heights
+from gyroid_cad.trim.edge_crossings import FacesToCut, edge_crossings, plane_heights
 from gyroid_cad.trim.sections import Sections, plane_sections, section_knots
 
 Floats = NDArray[np.float64]
@@ -20,11 +20,11 @@ T = np.linspace(0, 1, 501)
 SIZE = 1.0
 
 
-def sections_of(faces: Faces) -> Sections:
+def sections_of(faces: FacesToCut) -> Sections:
     return plane_sections(faces, edge_crossings(faces), SIZE)
 
 
-def misses(faces: Faces, sections: Sections, curve: int) -> tuple[Floats, Floats]:
+def misses(faces: FacesToCut, sections: Sections, curve: int) -> tuple[Floats, Floats]:
     """How far the curve in the square and the one in space are apart, and the latter from its plane."""
     places, points = sections.in_square(curve, T), sections.in_space(curve, T)
     which = sections.face[[curve]]
@@ -74,7 +74,7 @@ def test_a_circles_arcs_have_its_radius(graph: Graph, at: float) -> None:
 
 def test_the_same_place_has_the_same_curve_however_many_faces_are_cut_with_it(graph: Graph) -> None:
     one = graph(saddle, {4: 0.05, 0: 0.3})
-    many = Faces(np.repeat(one.nets, 3, axis=0), one.weights, one.knots, np.repeat(one.levels, 3, axis=0))
+    many = FacesToCut(np.repeat(one.nets, 3, axis=0), one.weights, one.knots, np.repeat(one.levels, 3, axis=0))
     alone, together = sections_of(one), sections_of(many)
     assert len(together) == 3 * len(alone)
     for curve in range(len(together)):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.edge_crossings import PLANES, Faces
+from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 from gyroid_cad.trim.loops import signed_area
 from gyroid_cad.trim.trimmed_faces import BOX, CutFace, cut_faces
 
@@ -24,7 +24,7 @@ def wavy(x: Floats, y: Floats) -> Floats:
     return 0.35 * x * y + 0.25 * x * x - 0.2 * y
 
 
-def cut(faces: Faces) -> CutFace:
+def cut(faces: FacesToCut) -> CutFace:
     return cut_faces(faces, SIZE)[0]
 
 
@@ -148,7 +148,7 @@ def test_the_bulge_of_an_arc_is_the_segment_beyond_its_chord(graph: Graph, radiu
 
 def test_many_faces_are_cut_as_one_by_one(graph: Graph) -> None:
     one = graph(wavy, {0: -0.3, 5: 0.12})
-    many = Faces(np.repeat(one.nets, 70, axis=0), one.weights, one.knots, np.repeat(one.levels, 70, axis=0))
+    many = FacesToCut(np.repeat(one.nets, 70, axis=0), one.weights, one.knots, np.repeat(one.levels, 70, axis=0))
     alone = sums(cut(one))
     for face in cut_faces(many, SIZE):
         np.testing.assert_allclose(sums(face), alone, atol=1e-12)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import cross
 
-__all__ = ["HEXAHEDRON_FACES", "NO_NUMBER", "hexahedron_corner_measures", "quadrilateral_corner_measures"]
+__all__ = ["HEXAHEDRON_FACES", "NO_NUMBER", "Measures", "hexahedron_corner_measures", "quadrilateral_corner_measures"]
 
 Floats = NDArray[np.float64]
 Measures = dict[str, Floats]

@@ -19,14 +19,17 @@ from numpy.typing import ArrayLike, NDArray
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.corner_measures import hexahedron_corner_measures, quadrilateral_corner_measures
+from gyroid_cad.mesh.finite_elements.corner_measures import (
+    Measures,
+    hexahedron_corner_measures,
+    quadrilateral_corner_measures,
+)
 from gyroid_cad.mesh.finite_elements.elements import element_type
 from gyroid_cad.mesh.finite_elements.summaries import (
     USUAL_BOUNDS,
     MeasureSummary,
     Quality,
     combined,
-    quality_rows,
     shown_name,
     shown_number,
     summary_of,
@@ -44,7 +47,6 @@ __all__ = [
     "hexahedron_nodes",
     "inverted",
     "quality_report",
-    "quality_rows",
     "sample_points",
     "sampled_determinants",
     "shape_gradients",
@@ -183,7 +185,6 @@ def _monomials(exponents: NDArray[np.int64], places: Floats) -> Floats:
 
 
 Integers = NDArray[np.int64]
-Measures = dict[str, Floats]
 
 _QUADRILATERAL = 4
 _CORNERS = 8

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import PNG, require_output
+from gyroid_cad.common.tables import text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.corner_measures import NO_NUMBER
 
@@ -29,7 +30,6 @@ __all__ = [
     "Quality",
     "combined",
     "draw_quality",
-    "quality_rows",
     "require_histogram",
     "shown_name",
     "shown_number",
@@ -117,6 +117,13 @@ class MeasureSummary:
         values = {name: getattr(self, name) for name in self.__slots__}
         return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
 
+    def cells(self, name: str) -> tuple[str, ...]:
+        """Numbers of the measure of this name, as a table shows them."""
+        numbers = (self.smallest, self.mean, self.largest, self.standard_deviation)
+        side = "<" if _KINDS[name].larger_is_better else ">"
+        place = (f"{coordinate + 0.0:.4g}" for coordinate in np.round(self.worst_place, 6).tolist())
+        return *map(shown_number, numbers), f"{self.beyond} {side} {self.bound:.3g}", ", ".join(place)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quality:
@@ -149,6 +156,17 @@ class Quality:
             "measures": {name: summary.as_dict() for name, summary in self.measures.items()},
         }
 
+    def header(self) -> tuple[str, ...]:
+        """Headings of the rows."""
+        return "measure", "smallest", "mean", "largest", "deviation", "beyond bound", "worst at (mm)"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """One line for each measure, as they are printed."""
+        return [(shown_name(name), *summary.cells(name)) for name, summary in self.measures.items()]
+
+    def __str__(self) -> str:
+        return text_table(self.rows(), self.header())
+
 
 def combined(qualities: Iterable[Quality]) -> Quality:
     """One report on several meshes of the same kind of element, numbered one after the other.
@@ -169,24 +187,6 @@ def shown_name(name: str) -> str:
 def shown_number(number: float) -> str:
     """A measure as people read it."""
     return "none" if number >= NO_NUMBER else f"{number:.4g}"
-
-
-def quality_rows(quality: Quality) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows of a table: a line for each measure."""
-    header = ("measure", "smallest", "mean", "largest", "deviation", "beyond bound", "worst at (mm)")
-    rows = []
-    for name, summary in quality.measures.items():
-        numbers = (summary.smallest, summary.mean, summary.largest, summary.standard_deviation)
-        side = "<" if _KINDS[name].larger_is_better else ">"
-        rows.append(
-            (
-                shown_name(name),
-                *map(shown_number, numbers),
-                f"{summary.beyond} {side} {summary.bound:.3g}",
-                ", ".join(f"{coordinate + 0.0:.4g}" for coordinate in np.round(summary.worst_place, 6).tolist()),
-            )
-        )
-    return header, rows
 
 
 def summary_of(name: str, values: Floats, bound: float, centres: Floats) -> MeasureSummary:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, require_format
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["read_triangles"]
+__all__ = ["binary_stl_corners", "numbered_corners", "read_triangles"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+Real = TypeVar("Real", np.float32, np.float64)
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 _HEADER_BYTES = 84
@@ -47,7 +49,7 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
             file.read(1)
     except OSError as problem:
         raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {problem.strerror}") from None
-    vertices, triangles = _read_3mf(target) if form is THREE_MF else _merged(_stl_corners(target))
+    vertices, triangles = _read_3mf(target) if form is THREE_MF else numbered_corners(_stl_corners(target))[:2]
     if not len(triangles) or not np.isfinite(vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
     return vertices, triangles
@@ -60,7 +62,7 @@ def _stl_corners(path: Path) -> Floats:
         count = int(np.fromfile(path, "<u4", 1, offset=_HEADER_BYTES - 4)[0])
         # Some programs begin binary files with "solid" too: the size tells them from text for certain.
         if size == _HEADER_BYTES + count * _RECORD.itemsize:
-            return np.asarray(np.fromfile(path, _RECORD, offset=_HEADER_BYTES)["corners"], dtype=float)
+            return binary_stl_corners(path).astype(float)
     try:
         lines = path.read_text(encoding="ascii").split("\n")
         corners = [line.split()[1:] for line in lines if line.lstrip().startswith("vertex")]
@@ -69,14 +71,32 @@ def _stl_corners(path: Path) -> Floats:
         raise ParameterError("file", str(path), _EXPECTED) from None
 
 
-def _merged(corners: Floats) -> tuple[Floats, Integers]:
+def binary_stl_corners(path: Path) -> NDArray[np.float32]:
+    """Read the corners of all triangles of a binary STL file; shape (triangles, 3, 3)."""
+    return np.asarray(np.fromfile(path, _RECORD, offset=_HEADER_BYTES)["corners"])
+
+
+def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, Booleans]:
+    """Number the corners of triangles: one where their coordinates are the same to the last bit.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (triangles, 3, 3)
+
+    Returns
+    -------
+    vertices : ndarray, shape (vertices, 3)
+    triangles : ndarray of int, shape (kept, 3)
+        Without slivers two of whose corners are one: what bounds nothing.
+    kept : ndarray of bool, shape (triangles,)
+    """
     # Minus zero is zero.
-    flat = np.ascontiguousarray(corners.reshape(-1, 3) + 0.0)
+    flat = np.ascontiguousarray(corners.reshape(-1, 3) + corners.dtype.type(0))
     keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
     _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
     triangles = numbers.reshape(-1, 3).astype(np.int64)
-    slivers = np.any(triangles == np.roll(triangles, 1, axis=1), axis=1)
-    return flat[first], triangles[~slivers]
+    kept = np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)
+    return flat[first], triangles[kept], kept
 
 
 def _read_3mf(path: Path) -> tuple[Floats, Integers]:

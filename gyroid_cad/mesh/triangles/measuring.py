@@ -23,7 +23,7 @@ from gyroid_cad.mesh.triangles.templates import (
 from gyroid_cad.nurbs.surface import edge_row
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["canonical_edges", "enclosed_volume", "face_cases", "face_deviations", "side_deviations"]
+__all__ = ["canonical_edges", "face_cases", "face_deviations", "side_deviations", "triangulated_volume"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -102,7 +102,7 @@ def side_deviations(
     return deviations, which
 
 
-def enclosed_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers, across: int) -> float:
+def triangulated_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers, across: int) -> float:
     """Volume in mm3 that the triangles of faces and side walls enclose, by the divergence theorem."""
     shifts = wall.shifts[wall.patch_shift]
     cases, which = face_cases(wall, patch_steps, edge_steps)

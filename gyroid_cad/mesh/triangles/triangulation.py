@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.triangles.measuring import enclosed_volume, face_cases, face_deviations, side_deviations
+from gyroid_cad.mesh.triangles.measuring import face_cases, face_deviations, side_deviations, triangulated_volume
 from gyroid_cad.mesh.triangles.templates import FEWEST_STEPS, Template, wall_template
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Subdivision", "Triangulation", "subdivided", "triangulated"]
+__all__ = ["Subdivision", "Triangulation", "parting", "subdivided", "triangulated"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -160,10 +160,9 @@ def _lines_along(along: int) -> Template:
     return Template(full.places, np.empty((0, 3), dtype=np.int64), full.sides[same])
 
 
-# How far triangles that touch in a line without belonging together are parted: a thousandth of the deviation, but
-# enough for the single-precision numbers of STL and 3MF to tell them apart. The kernel's writer does the same.
-_PARTING = 1e-3
-_SINGLE_PRECISION_STEPS = 8
+# Triangles that touch in a line without belonging together are parted by so much of the deviation, but by enough
+# steps of the single-precision numbers of STL and 3MF for these to tell them apart.
+_PARTING, _SINGLE_PRECISION_STEPS = 1e-3, 8
 # Of the secant method for the volume: each step squares what is left, and the first leaves 1e-5.
 _SECANT_STEPS = 2
 # A part of the thickness that changes no volume but by rounding.
@@ -243,7 +242,6 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
         # What is offset falls with the rest: never all is reserved for it.
         reserved = min(volume_offset, (deviation + reserved) / 2)
     furthest = float(np.abs(thicker.nets).max() + np.abs(wall.shifts).max())
-    parting = max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
     return Triangulation(
         wall=thicker,
         patch_steps=steps.patch_steps,
@@ -251,22 +249,40 @@ def triangulated(wall: Wall, deviation: float) -> Triangulation:
         across=steps.across,
         deviation=steps.deviation + volume_offset,
         volume_offset=volume_offset,
-        parting=parting,
+        parting=parting(deviation, furthest),
         volume=enclosed,
     )
+
+
+def parting(deviation: float, furthest: float) -> float:
+    """Distance in mm by which triangles that touch in a line, and do not belong together, are parted.
+
+    Parameters
+    ----------
+    deviation : float
+        Of the triangles, in mm.
+    furthest : float
+        The largest of their coordinates, in mm.
+
+    Examples
+    --------
+    >>> parting(0.01, 20.0)
+    1.9073486328125e-05
+    """
+    return max(_PARTING * deviation, _SINGLE_PRECISION_STEPS * float(np.finfo(np.float32).eps) * furthest)
 
 
 def _of_volume(wall: Wall, steps: Subdivision, volume: float) -> tuple[Wall, float, float]:
     """The wall offset so that its triangles enclose a volume, what they enclose, and by which part of itself."""
     part, thicker = 0.0, wall
-    enclosed = enclosed_volume(wall, steps.patch_steps, steps.edge_steps, steps.across)
+    enclosed = triangulated_volume(wall, steps.patch_steps, steps.edge_steps, steps.across)
     # Of a thin wall the volume goes with the thickness, which grows on both sides.
     following = (volume / enclosed - 1) / 2
     for _ in range(_SECANT_STEPS):
         if abs(following - part) < _NOTHING:
             break
         thicker = _offset(wall, following)
-        found = enclosed_volume(thicker, steps.patch_steps, steps.edge_steps, steps.across)
+        found = triangulated_volume(thicker, steps.patch_steps, steps.edge_steps, steps.across)
         slope = (found - enclosed) / (following - part)
         part, enclosed = following, found
         following = part + (volume - enclosed) / slope

@@ -19,7 +19,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.makers import linear
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.measuring import enclosed_volume, face_cases, face_deviations
+from gyroid_cad.mesh.triangles.measuring import face_cases, face_deviations, triangulated_volume
 from gyroid_cad.mesh.triangles.triangulation import MOST_STEPS, Triangulation, subdivided, triangulated
 from gyroid_cad.nurbs.surface import NurbsSurface
 from gyroid_cad.surface.fit import FitSettings
@@ -212,7 +212,7 @@ def test_the_deviation_and_the_missing_volume_fall_with_the_square_of_the_steps(
     missing, deviation = [], []
     for count in counts.tolist():
         steps = np.full(wall.complex.patch_count, count), np.full(wall.complex.edge_count, count)
-        missing.append(1 - enclosed_volume(wall, *steps, across=count // 4) / wall.volume())
+        missing.append(1 - triangulated_volume(wall, *steps, across=count // 4) / wall.volume())
         deviation.append(face_deviations(wall, face_cases(wall, *steps)[0][:4]).max())
     for error in (missing, deviation):
         assert np.polyfit(np.log(counts), np.log(error), 1)[0] == pytest.approx(-2, abs=0.1)

@@ -12,8 +12,7 @@ from OCP.GProp import GProp_GProps
 from OCP.TopoDS import TopoDS_Face
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.part import require_part
-from gyroid_cad.kernel.selection import selected_faces
+from gyroid_cad.kernel.part import require_part, selected_faces
 
 BOX = bd.Box(2, 4, 6)
 TOP = BOX.faces().sort_by(bd.Axis.Z)[-1]

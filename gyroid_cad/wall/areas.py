@@ -1,0 +1,147 @@
+"""Areas of a wall's surfaces: of both faces, and of the side walls that close its rim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.nurbs.surface import gauss_points, grid_derivatives
+from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.exact import differentiation_matrix, offset_patches
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.offset import SIDES, Wall
+
+__all__ = ["WallAreas", "distinct_patches", "exact_areas", "fitted_areas"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Gauss points along each side of an exact patch, and across a side wall, in whose direction the integrand is the root
+# of a polynomial that is nearly constant.
+_EXACT_POINTS, _ACROSS_POINTS = 16, 4
+# So few that what is computed for them stays in the processor's cache.
+_NETS_AT_ONCE = 64
+
+
+@dataclass(frozen=True, slots=True)
+class WallAreas:
+    """Areas in mm2 of a wall's surfaces.
+
+    Attributes
+    ----------
+    face_a, face_b : float
+        Towards the network that the common normal points to, and towards the other.
+    rim : float
+        Of the side walls in which a block of whole patches ends.
+    """
+
+    face_a: float
+    face_b: float
+    rim: float = 0.0
+
+    @property
+    def faces(self) -> float:
+        """Area of both faces."""
+        return self.face_a + self.face_b
+
+    @property
+    def total(self) -> float:
+        """Area of all that bounds the wall."""
+        return self.faces + self.rim
+
+
+def fitted_areas(wall: Wall) -> WallAreas:
+    """Areas of the fitted faces, and of the side walls that close the lattice's rim, by Gauss quadrature of the nets.
+
+    Parameters
+    ----------
+    wall : Wall
+
+    Returns
+    -------
+    WallAreas
+    """
+    u, v, weights = wall.face(0, 0).quadrature()
+    uses = np.bincount(wall.patch_net, minlength=len(wall.nets))
+    totals = np.zeros(2)
+    for first in range(0, len(wall.nets), _NETS_AT_ONCE):
+        some = slice(first, first + _NETS_AT_ONCE)
+        _, du, dv = grid_derivatives(wall.nets[some], wall.weights, (wall.knots, wall.knots), u.ravel(), v.ravel())
+        area = np.linalg.norm(np.cross(du, dv), axis=-1)
+        totals += np.einsum("p,uv,psuv->s", uses[some], weights, area)
+    return WallAreas(face_a=float(totals[1]), face_b=float(totals[0]), rim=_rim_area(wall))
+
+
+def exact_areas(complex: CellComplex, grading: Grading, patches: Integers, uses: Integers) -> WallAreas:
+    """Areas of the exact wall's faces, by quadrature; patches are analytic, so it converges faster than any power.
+
+    Parameters
+    ----------
+    complex : CellComplex
+    grading : Grading
+    patches, uses : ndarray of int
+        Which patches are looked at, and for how many each of them stands.
+
+    Returns
+    -------
+    WallAreas
+        Without a rim.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_EXACT_POINTS)
+    rate, shape = differentiation_matrix(nodes), (-1, len(nodes), len(nodes), 3)
+    totals = np.zeros(2)
+    for some, exact in offset_patches(complex, grading, nodes, patches):
+        offset = exact.normals * (exact.thickness / 2)[:, np.newaxis]
+        for side in SIDES:
+            face = (exact.points + (2 * side - 1) * offset).reshape(shape)
+            along_u, along_v = np.einsum("ab,pbvc->pavc", rate, face), np.einsum("ab,pubc->puac", rate, face)
+            area = np.linalg.norm(np.cross(along_u, along_v), axis=-1)
+            totals[side] += float(np.einsum("p,u,v,puv->", uses[some], weights, weights, area))
+    return WallAreas(face_a=float(totals[1]), face_b=float(totals[0]))
+
+
+def distinct_patches(wall: Wall) -> tuple[Integers, Integers]:
+    """One of the patches that are alike, and how many are like it."""
+    _, patches, uses = np.unique(wall.patch_net, return_index=True, return_counts=True)
+    return patches.astype(np.int64), uses.astype(np.int64)
+
+
+def _rim_area(wall: Wall) -> float:
+    """Area of the ruled side walls along free edges."""
+    # How often the side wall along each edge of each distinct patch is there.
+    free = wall.complex.free[wall.complex.patch_edges]
+    uses = np.zeros((len(wall.nets), 4))
+    np.add.at(uses, wall.patch_net, free)
+    total = 0.0
+    ended = np.flatnonzero(uses.any(axis=1))
+    for first in range(0, len(ended), _NETS_AT_ONCE):
+        some = ended[first : first + _NETS_AT_ONCE]
+        total += float(np.sum(uses[some] * _side_wall_areas(wall, wall.nets[some])))
+    return total
+
+
+def _side_wall_areas(wall: Wall, nets: Floats) -> Floats:
+    """Areas of the four side walls of each net; shape (nets, 4)."""
+    along, along_weights = gauss_points(wall.knots, _ACROSS_POINTS)
+    nodes, across_weights = np.polynomial.legendre.leggauss(_ACROSS_POINTS)
+    across, across_weights = (nodes + 1) / 2, across_weights / 2
+    knots, ends = (wall.knots, wall.knots), (-1.0, 1.0)
+    at_v, rate_u, _ = grid_derivatives(nets, wall.weights, knots, along, ends)
+    at_u, _, rate_v = grid_derivatives(nets, wall.weights, knots, ends, along)
+    areas = np.empty((len(nets), 4))
+    # As edges run round the square: v = -1, u = 1, v = 1, u = -1.
+    curves = (
+        (at_v[..., 0, :], rate_u[..., 0, :]),
+        (at_u[..., 1, :, :], rate_v[..., 1, :, :]),
+        (at_v[..., 1, :], rate_u[..., 1, :]),
+        (at_u[..., 0, :, :], rate_v[..., 0, :, :]),
+    )
+    for edge, (points, rates) in enumerate(curves):
+        through = (points[:, 1] - points[:, 0])[:, np.newaxis]
+        s = across[:, np.newaxis, np.newaxis]
+        between = (1 - s) * rates[:, 0, np.newaxis] + s * rates[:, 1, np.newaxis]
+        element = np.linalg.norm(np.cross(between, through), axis=-1)
+        areas[:, edge] = np.einsum("s,a,psa->p", across_weights, along_weights, element)
+    return areas

@@ -23,7 +23,7 @@ from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.common.formats import MESH_FORMATS
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra, quadrilaterals
-from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.nurbs.basis import basis
 
 __all__ = ["main"]
 

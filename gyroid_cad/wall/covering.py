@@ -16,7 +16,7 @@ from gyroid_cad.common.graph import connected
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.exact import offset_patches, patch_points, patch_points_and_normals
+from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 
 __all__ = [
@@ -31,7 +31,6 @@ __all__ = [
     "nearest_offsets",
     "patch_sides",
     "periodic_offsets",
-    "sides_of_points",
     "wall_extremes",
 ]
 
@@ -124,8 +123,7 @@ def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> 
 
 def patch_sides(
     complex: CellComplex,
-    frame: Frame,
-    cell_size: float,
+    points: Floats,
     reach: float,
     distance: Callable[[Floats], Floats],
     contains: Callable[[Floats], Booleans],
@@ -135,36 +133,14 @@ def patch_sides(
     Parameters
     ----------
     complex : CellComplex
-    frame : Frame
-    cell_size, reach : float
+    points : ndarray, shape (patches, :data:`SIDE_SAMPLES` squared, 3)
+        Of the mid-surface, on a grid, in mm, in the part's space.
+    reach : float
         In mm.
     distance : callable
         Of points (n, 3) in the part's space: no more than their distance from its boundary, in mm.
     contains : callable
         Which of some points lie inside the part.
-    """
-    points = frame.placed(patch_points(complex, cell_size, np.linspace(-1, 1, SIDE_SAMPLES)))
-    return sides_of_points(complex, points, reach, distance, contains)
-
-
-def sides_of_points(
-    complex: CellComplex,
-    points: Floats,
-    reach: float,
-    distance: Callable[[Floats], Floats],
-    contains: Callable[[Floats], Booleans],
-) -> Integers:
-    """Sort patches, wherever they lie, as :func:`patch_sides` does; shape (patches,).
-
-    Parameters
-    ----------
-    complex : CellComplex
-    points : ndarray, shape (patches, :data:`SIDE_SAMPLES` squared, 3)
-        Of the mid-surface, on a grid, in mm.
-    reach : float
-        In mm.
-    distance, contains : callable
-        As of :func:`patch_sides`.
     """
     # Every place of a patch is within half a step between samples, along both sides, of one of them.
     grid = points.reshape(-1, SIDE_SAMPLES, SIDE_SAMPLES, 3)

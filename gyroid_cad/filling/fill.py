@@ -24,6 +24,7 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
@@ -131,7 +132,7 @@ class FillReport:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filled:
+class Filled(HostShapes):
     """A filled part.
 
     Attributes

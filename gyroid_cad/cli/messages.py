@@ -18,11 +18,23 @@ from gyroid_cad.errors import GyroidError, ParameterError
 if TYPE_CHECKING:
     from gyroid_cad.cli.config import Config
 
-__all__ = ["BAD_USAGE", "FAILED", "INTERRUPTED", "Session", "debug_option", "failed", "label", "remember_config"]
+__all__ = [
+    "BAD_USAGE",
+    "FAILED",
+    "INTERRUPTED",
+    "Session",
+    "config_of",
+    "debug_option",
+    "failed",
+    "label",
+    "remember_config",
+]
 
 # The last as shells say it of a program that wrote into a closed pipe.
 FAILED, BAD_USAGE, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 _CONFIG = "gyroid_cad.config"
+# Parameters of Python that a command calls otherwise, for it takes one after the other.
+_OPTION_OF = {"openings": "opening"}
 # What a parameter may have been reckoned from.
 _GIVEN_AS = {"density": "porosity"}
 _MEMORY = "memory gave out: it takes fewer cells, coarser triangles, or more memory for this process"
@@ -75,6 +87,11 @@ def remember_config(context: click.Context, config: Config, defaults: dict[str, 
     context.default_map = defaults
 
 
+def config_of(context: click.Context) -> Config | None:
+    """Return the file that a command takes its defaults from, if it takes any."""
+    return context.meta.get(_CONFIG)
+
+
 def label(context: click.Context | None, parameter: str) -> str:
     """Name a parameter as the user gave it: an option, or the line and key of a file.
 
@@ -86,14 +103,19 @@ def label(context: click.Context | None, parameter: str) -> str:
         As the options call it in Python.
     """
     known = {} if context is None else {option.name: option for option in context.command.params}
-    option = known.get(parameter)
-    if context is None or not isinstance(option, click.Option):
+    option = known.get(_OPTION_OF.get(parameter, parameter))
+    if context is None or option is None or option.name is None:
         return parameter
+    parameter = option.name
+    config = config_of(context)
+    if isinstance(option, click.Argument):
+        return config.place(parameter) if config is not None and parameter in config.values else parameter
     other = _GIVEN_AS.get(parameter)
     if context.params.get(parameter) is None and other is not None and context.params.get(other) is not None:
         return f"{label(context, other)}: {parameter}"
     if context.get_parameter_source(parameter) == click.core.ParameterSource.DEFAULT_MAP:
-        return str(context.meta[_CONFIG].place(parameter))
+        assert config is not None
+        return config.place(parameter)
     return option.opts[0]
 
 

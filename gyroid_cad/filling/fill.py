@@ -16,7 +16,7 @@ from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
@@ -166,6 +166,18 @@ class Filled(HostShapes):
     def __str__(self) -> str:
         return str(self.report)
 
+    def deviation(self, given: float | None = None) -> float:
+        """Return the largest distance of triangles from the faces, in mm: the usual one if none is given.
+
+        Raises
+        ------
+        ParameterError
+        """
+        usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
+        limit = usual if given is None else finite_number("deviation", given)
+        require_meshing(limit)
+        return limit
+
     def write(
         self,
         *paths: str | os.PathLike[str],
@@ -181,8 +193,7 @@ class Filled(HostShapes):
         ParameterError, ExportError
         """
         targets = require_formats(paths)
-        usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
-        limit = usual if deviation is None else finite_number("deviation", deviation)
+        limit = self.deviation(deviation)
         require_settings((1, 1, 1), schema, limit, angle)
         for path in targets:
             if not self.report.closed and format_of(path) in TRIANGLE_FORMATS:

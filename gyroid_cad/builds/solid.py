@@ -97,7 +97,7 @@ class Build:
 
     def _trimmed(self, shift: Floats, progress: Progress | None) -> tuple[KernelShape, float, int]:
         """Return the shape cut to the block of cells, its volume, and how many patches are in it."""
-        from gyroid_cad.kernel.split import compound_of
+        from gyroid_cad.kernel.check import compound_of
         from gyroid_cad.kernel.trimmed import build_trimmed
 
         spec = self.fitted.spec

@@ -170,10 +170,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 failed, 2 bad usage; an error is one line on stderr.
     """
-    if (answered := answered_shell(commands, PROGRAM)) is not None:
-        return answered
     session = Session()
     try:
+        if (answered := answered_shell(commands, PROGRAM)) is not None:
+            return answered
         # Not commands.main: it would put an empty line before the one that says "interrupted".
         with (
             commands.make_context(

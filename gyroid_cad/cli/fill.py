@@ -1,4 +1,4 @@
-"""``gyroid-cad fill``: a part from a STEP file goes in, the same part filled with gyroid comes out."""
+"""``gyroid-cad fill``: a part from a STEP or BREP file goes in, the same part filled with gyroid comes out."""
 
 from __future__ import annotations
 
@@ -58,7 +58,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 
 @click.command("fill")
 @click.argument(
-    "part", nargs=-1, metavar="[PART.step] [FILL.toml]", is_eager=True, callback=_take_files, shell_complete=file_paths
+    "part",
+    nargs=-1,
+    metavar="[PART.step|PART.brep] [FILL.toml]",
+    is_eager=True,
+    callback=_take_files,
+    shell_complete=file_paths,
 )
 @output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.")
 @infill_options
@@ -111,7 +116,7 @@ def fill_command(
     quiet: bool,
     **given: Any,
 ) -> None:
-    """Fill the solids of a STEP file with gyroid and write what is left.
+    """Fill the solids of a STEP or BREP file with gyroid and write what is left.
 
     A TOML file has these options as keys, with underscores, and the part as "part"; options given as well override it.
 

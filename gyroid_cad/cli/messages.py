@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -26,12 +30,17 @@ __all__ = [
     "remember_config",
 ]
 
-FAILED, BAD_USAGE, INTERRUPTED = 1, 2, 130
+# The last as shells say it of a program that wrote into a closed pipe.
+FAILED, BAD_USAGE, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 _CONFIG = "gyroid_cad.config"
 # Parameters of Python that a command calls otherwise, for it takes one after the other.
 _OPTION_OF = {"openings": "opening"}
 # What a parameter may have been reckoned from.
 _GIVEN_AS = {"density": "porosity"}
+_MEMORY = "memory gave out: it takes fewer cells, coarser triangles, or more memory for this process"
+_UNWRITTEN = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EBADF)
+# What the system says, in an ImportError, when a library finds no room.
+_NO_ROOM = ("cannot allocate memory", "failed to map segment")
 # Of a number of thousands of digits the beginning tells.
 _LONGEST_WORD, _SHOWN_OF_IT = 1000, 100
 
@@ -124,11 +133,14 @@ def failed(problem: Exception | KeyboardInterrupt, program: str, session: Sessio
     int
         The status to leave with.
     """
-    if session.debug:
-        click.echo("".join(traceback.format_exception(problem)), err=True, nl=False)
     message, status = _message(problem, session.context)
     words = [word if len(word) <= _LONGEST_WORD else f"{word[:_SHOWN_OF_IT]}..." for word in message.split()]
-    click.echo(f"{program}: error: {' '.join(words)}", err=True)
+    # Where nobody listens on the error stream either, the status has to do.
+    with suppress(OSError):
+        if session.debug:
+            click.echo("".join(traceback.format_exception(problem)), err=True, nl=False)
+        if words:
+            click.echo(f"{program}: error: {' '.join(words)}", err=True)
     return status
 
 
@@ -141,6 +153,20 @@ def _message(problem: Exception | KeyboardInterrupt, context: click.Context | No
         return "interrupted", INTERRUPTED
     if isinstance(problem, GyroidError):
         return str(problem), FAILED
+    return _of_system(problem)
+
+
+def _of_system(problem: BaseException) -> tuple[str, int]:
+    """Message of an error that is none of ours, nor of what the user gave."""
+    if _ran_out_of_memory(problem):
+        return _MEMORY, FAILED
+    # Files are written by name, and then it is an ExportError: what is left is what is printed.
+    if isinstance(problem, OSError) and problem.filename is None and problem.errno in _UNWRITTEN:
+        _discard_output()
+        if problem.errno == errno.EPIPE:
+            # Whoever read it has had enough, as `head` has: nothing went wrong that anybody needs to be told.
+            return "", PIPE_CLOSED
+        return f"standard output could not be written: {problem.strerror}", FAILED
     # A defect of ours is still one line for the user.
     return f"unexpected {type(problem).__name__}: {problem}", FAILED
 
@@ -161,6 +187,27 @@ def _of_parameter(problem: ParameterError, context: click.Context | None) -> str
     if not all(name.isidentifier() for name in names):
         return str(problem)
     return str(problem).replace(problem.parameter, ", ".join(label(context, name) for name in names), 1)
+
+
+def _discard_output() -> None:
+    """Send what is left of standard output nowhere: Python writes it when it leaves, and would complain again."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+
+
+def _ran_out_of_memory(problem: BaseException | None) -> bool:
+    """Tell whether it is memory that an error is about: the kernel's has a class of its own, a library's none."""
+    while problem is not None:
+        if isinstance(problem, OSError) and problem.errno == errno.ENOMEM:
+            return True
+        if isinstance(problem, MemoryError) or type(problem).__name__ == "Standard_OutOfMemory":
+            return True
+        if isinstance(problem, ImportError) and any(words in str(problem).lower() for words in _NO_ROOM):
+            return True
+        problem = problem.__cause__ or problem.__context__
+    return False
 
 
 def _was_interrupted(problem: BaseException | None) -> bool:

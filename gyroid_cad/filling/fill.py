@@ -24,11 +24,11 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
-from gyroid_cad.kernel.check import topology
+from gyroid_cad.host_shapes import HostShapes
+from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
-from gyroid_cad.kernel.split import compound_of
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
@@ -132,7 +132,7 @@ class FillReport:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filled:
+class Filled(HostShapes):
     """A filled part.
 
     Attributes
@@ -228,7 +228,7 @@ def fill(
     Parameters
     ----------
     part : shape, Workplane or path-like
-        A TopoDS_Shape, a shape of CadQuery or build123d, or a STEP file; its solids must be closed and valid.
+        A TopoDS_Shape, a shape of CadQuery or build123d, or a STEP or BREP file; its solids must be closed and valid.
     cell_size : float
         Period of the cubic cell, in mm.
     thickness : number or field, optional

@@ -18,13 +18,13 @@ from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
-from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.apart import read_shape
+from gyroid_cad.kernel.check import compound_of, is_valid, topology
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
-from gyroid_cad.kernel.step import read_step
+from gyroid_cad.kernel.split import bounded_solids, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
@@ -286,16 +286,18 @@ def part_of(given: Any) -> Part:
     ------
     ParameterError
     ExportError
-        If a file is no STEP file or holds no shape.
+        If a file is neither STEP nor BREP, or holds no shape.
     """
 
     if isinstance(given, str | os.PathLike):
-        return require_part(read_step(given))
+        return require_part(read_shape(given))
     if hasattr(given, "vals"):
         return require_part(compound_of(shape.wrapped for shape in given.vals()))
     shape = getattr(given, "wrapped", given)
     if not hasattr(shape, "ShapeType"):
-        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
+        raise ParameterError(
+            "part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, a STEP or BREP file"
+        )
     return require_part(shape)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.Geom import Geom_BSplineSurface
 from OCP.TopAbs import (
@@ -21,14 +21,14 @@ from OCP.TopAbs import (
 )
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Shape
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.surface import NurbsSurface, face_integrals
 
-__all__ = ["Topology", "enclosed_volume", "is_valid", "parts_of", "topology"]
+__all__ = ["Topology", "compound_of", "enclosed_volume", "is_valid", "parts_of", "topology"]
 
 Floats = NDArray[np.float64]
 
@@ -144,3 +144,12 @@ def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Sha
     while explorer.More():
         yield explorer.Current()
         explorer.Next()
+
+
+def compound_of(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
+    """The shapes in one compound."""
+    builder, compound = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(compound)
+    for shape in shapes:
+        builder.Add(compound, shape)
+    return compound

@@ -21,13 +21,14 @@ from OCP.TopoDS import TopoDS_Shape
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_ColorTool, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.apart import Contents, read_apart, require_cad_file
 from gyroid_cad.kernel.assembly import new_document
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence, NumberedShapes
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.step import no_messages
 
-__all__ = ["Colour", "ColouredPart", "coloured_parts", "extent_of"]
+__all__ = ["Colour", "ColouredPart", "coloured_contents", "coloured_parts", "extent_of"]
 
 # Red, green and blue, 0 to 1, as a screen has them (sRGB); none where the file says nothing.
 Colour = tuple[float, float, float] | None
@@ -65,9 +66,16 @@ def coloured_parts(path: str | os.PathLike[str]) -> list[ColouredPart]:
     ExportError
         If the file is missing, not STEP, or holds no shape.
     """
+    require_cad_file(path)
+    shapes, described = read_apart(path, coloured_contents)
+    return [ColouredPart(shape, *rest) for shape, rest in zip(shapes, described, strict=True)]
+
+
+def coloured_contents(path: str) -> Contents:
+    """Read parts of a STEP file, with their colours and places, in this process."""
     document, reader = new_document(), STEPCAFControl_Reader()
     with no_messages():
-        if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
+        if reader.ReadFile(path) != IFSelect_RetDone or not reader.Transfer(document):
             raise ExportError(f"{path} could not be read as STEP")
     free = LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
@@ -76,7 +84,8 @@ def coloured_parts(path: str | os.PathLike[str]) -> list[ColouredPart]:
         found.add(label, TopLoc_Location(), None)
     if not found.places:
         raise ExportError(f"{path} holds no shape")
-    return found.parts()
+    parts = found.parts()
+    return [part.shape for part in parts], [(part.colours, part.places) for part in parts]
 
 
 def extent_of(parts: Sequence[ColouredPart]) -> float:

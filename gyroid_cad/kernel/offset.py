@@ -6,7 +6,6 @@ that is for :mod:`gyroid_cad.kernel.offset` to find out.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -35,6 +34,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.apart import started
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths
@@ -69,7 +69,7 @@ def offsets(
         BinTools.Write_s(solid, str(Path(folder, _SOLID)))
         left = list(ways)
         while left:
-            process = _start(folder, repr(skin), ",".join(map(str, numbers)), *left)
+            process = started(_WORK, folder, repr(skin), ",".join(map(str, numbers)), *left)
             try:
                 while left and (found := _awaited(process, Path(folder, left[0]))):
                     left.pop(0)
@@ -80,17 +80,6 @@ def offsets(
             if left:
                 left.pop(0)
                 yield None
-
-
-def _start(*arguments: str) -> subprocess.Popen[bytes]:
-    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
-    return subprocess.Popen(
-        [sys.executable, "-c", _WORK, *arguments],
-        env={**os.environ, "PYTHONPATH": paths},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
 
 
 def _awaited(process: subprocess.Popen[bytes], path: Path) -> Path | None:

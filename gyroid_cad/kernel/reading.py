@@ -1,27 +1,22 @@
-"""A CAD file as it is: read without conditions, measured, checked, and turned into triangles to be looked at."""
+"""A CAD shape as it is: measured, checked, and turned into triangles to be looked at."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.BRep import BRep_Builder, BRep_Tool
-from OCP.BRepTools import BRepTools
+from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_BSplineSurface
 from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from gyroid_cad.common.formats import BREP, format_of
-from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.apart import read_shape
 from gyroid_cad.kernel.check import Topology, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.part import measure
-from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.stl import diagonal, meshed_by_face
 
 __all__ = ["Described", "described", "lattice_sides", "read_shape", "shown_triangles"]
@@ -35,8 +30,6 @@ _SHOWN_ANGLE = 20.0
 _FINEST = 1e-6
 # Of what is read from files that were written with so many digits.
 _PARAMETER_TOLERANCE = 1e-9
-# What the first lines of a BREP file say, and how many bytes these take at most.
-_BREP_MARK, _BREP_HEADER = b"CASCADE Topology V", 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,28 +53,6 @@ class Described:
     high: tuple[float, ...]
     volume: float
     area: float
-
-
-def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
-    """Read a STEP or BREP file, by its ending, in millimetres.
-
-    Raises
-    ------
-    ExportError
-        If it cannot be read, or holds no shape.
-    """
-    if format_of(path) is not BREP:
-        return read_step(path)
-    shape = TopoDS_Shape()
-    # Of text that is something else the kernel complains on standard output.
-    try:
-        with Path(path).open("rb") as file:
-            known = _BREP_MARK in file.read(_BREP_HEADER)
-    except OSError as problem:
-        raise ExportError(f"{path} could not be read: {problem.strerror}") from None
-    if not known or not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
-        raise ExportError(f"{path} could not be read as BREP")
-    return shape
 
 
 def described(shape: TopoDS_Shape) -> Described:

@@ -31,9 +31,10 @@ from OCP.TopoDS import (
     TopoDS_Wire,
 )
 
+from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.kernel.compat import as_edge, as_face, as_vertex
 from gyroid_cad.kernel.region_split import NEW, Edge, Found, RegionPiece, Task, all_of, place_of
-from gyroid_cad.kernel.split import Pieces, changes, compound_of, general_fuse, modified, running_like
+from gyroid_cad.kernel.split import Pieces, changes, general_fuse, modified, running_like
 
 __all__ = ["Joining"]
 

@@ -20,12 +20,12 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
 
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.kernel.check import is_valid, parts_of
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.split import Change, Pieces, compound_of, inner_sides, modified, solids_of
+from gyroid_cad.kernel.split import Change, Pieces, inner_sides, modified, solids_of
 
 __all__ = ["Hollow", "hollow", "openings_of"]
 

@@ -28,11 +28,11 @@ from OCP.TopAbs import (
     TopAbs_REVERSED,
     TopAbs_VERTEX,
 )
-from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.check import compound_of, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, ShapeList, as_edge, as_face
 from gyroid_cad.kernel.extent import box_round
 from gyroid_cad.kernel.part import Part
@@ -41,7 +41,6 @@ __all__ = [
     "Pieces",
     "bounded_solids",
     "changes",
-    "compound_of",
     "connected_shells",
     "general_fuse",
     "inner_point",
@@ -221,15 +220,6 @@ def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[boo
             wanted[index] = wanted_at(np.array([point.X(), point.Y(), point.Z()]))
             _spread(wanted, [index], beside)
     return [wanted[index] for index in range(count, count + len(pieces.boundary))]
-
-
-def compound_of(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
-    """The shapes in one compound."""
-    builder, compound = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(compound)
-    for shape in shapes:
-        builder.Add(compound, shape)
-    return compound
 
 
 @dataclass(frozen=True, slots=True)

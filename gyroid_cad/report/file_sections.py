@@ -68,7 +68,8 @@ def file_section(contents: FileContents) -> dict[str, Any]:
 
 
 def _shape_of(path: Path, form: Format) -> FileContents:
-    from gyroid_cad.kernel.reading import described, read_shape
+    from gyroid_cad.kernel.apart import read_shape
+    from gyroid_cad.kernel.reading import described
 
     shape = read_shape(path)
     found = described(shape)

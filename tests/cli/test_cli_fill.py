@@ -14,6 +14,7 @@ import pytest
 from gyroid_cad.cli.app import main
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.fill import fill
+from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
@@ -120,11 +121,11 @@ def test_the_bare_surface_is_written_as_shells(capsys: Captured, block: Path) ->
     assert topology(shape).faces == json.loads(done.out)["faces"]
 
 
-@pytest.mark.parametrize("unit", ["INCH", "MM"])
-def test_lengths_in_a_file_are_what_its_unit_says(capsys: Captured, tmp_path: Path, unit: str) -> None:
+@pytest.mark.parametrize(("unit", "length"), [("INCH", 25.4), ("MM", 1.0)])
+def test_lengths_in_a_file_are_what_its_unit_says(capsys: Captured, tmp_path: Path, unit: str, length: float) -> None:
     path = tmp_path / "part.step"
-    cq.exporters.export(cq.Workplane().box(4, 4, 4), str(path), unit=unit)
-    # Not only the file's unit differs: an inch is 25.4 mm, so its numbers do.
+    size = 4 / length
+    cq.exporters.export(cq.Workplane().box(size, size, size), str(path), unit=unit)
     assert ("'INCH'" in path.read_text()) == (unit == "INCH")
     done = run(capsys, path, "-o", tmp_path / "a.brep", *FILL, "--thickness", "1", "--json")
     assert json.loads(done.out)["part_volume"] == pytest.approx(4**3)
@@ -181,6 +182,21 @@ def test_bad_usage_is_one_line_and_leaves_no_file(capsys: Captured, peg: Path, o
     assert len(failed.err.splitlines()) == 1
     assert words in failed.err
     assert not peg.with_name("a.step").exists()
+
+
+def test_a_part_may_be_brep(capsys: Captured, block: Path) -> None:
+    part = block.with_suffix(".brep")
+    write_brep(read_step(block), part)
+    done = run(capsys, part, "-o", block.with_name("a.brep"), *FILL, "--thickness", "1", "--json")
+    assert done.status == 0, done.err
+    assert json.loads(done.out)["part_volume"] == pytest.approx(6 * 5 * 7)
+
+
+def test_triangles_are_no_part_and_the_message_says_what_is(capsys: Captured, tmp_path: Path) -> None:
+    (tmp_path / "part.stl").write_text("solid a\nendsolid a\n")
+    failed = run(capsys, tmp_path / "part.stl", "-o", tmp_path / "a.step", *FILL, "--density", "0.3")
+    assert failed.status == 1
+    assert "part.stl could not be read: it is STL by its ending, where STEP or BREP is needed" in failed.err
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not STEP", b"ISO-10303-21;\nHEADER;\n"])

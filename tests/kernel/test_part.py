@@ -14,10 +14,9 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.check import compound_of, parts_of
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import measure, require_part
-from gyroid_cad.kernel.split import compound_of
 
 Floats = NDArray[np.float64]
 

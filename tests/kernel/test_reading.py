@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.apart import read_shape
 from gyroid_cad.kernel.brep import write_brep
-from gyroid_cad.kernel.reading import described, lattice_sides, read_shape, shown_triangles
+from gyroid_cad.kernel.reading import described, lattice_sides, shown_triangles
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
 

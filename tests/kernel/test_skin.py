@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 import gyroid_cad.kernel.offset
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.extent import bounding_box
@@ -26,7 +26,7 @@ from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.skin import Hollow, hollow, openings_of
 from gyroid_cad.kernel.solid import build_faces
-from gyroid_cad.kernel.split import bounded_solids, compound_of, split
+from gyroid_cad.kernel.split import bounded_solids, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.covering import CROSSING, INSIDE, SIDE_SAMPLES, Frame, covering_complex, patch_sides

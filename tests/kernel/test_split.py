@@ -15,11 +15,11 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import measure, require_part
 from gyroid_cad.kernel.solid import build_faces, build_solid
-from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
+from gyroid_cad.kernel.split import Pieces, bounded_solids, split
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.covering import CROSSING, INSIDE, SIDE_SAMPLES, Frame, covering_complex, patch_sides

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
+import cadquery as cq
 import numpy as np
 import pytest
 from OCP.Interface import Interface_Static
@@ -18,6 +19,7 @@ from scipy.spatial import cKDTree
 from gyroid_cad.common.formats import SCHEMAS, require_schema
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
+from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.solid import TOLERANCE, build_solid
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
@@ -277,3 +279,13 @@ def test_reading_says_which_file_is_missing_is_no_step_or_holds_no_shape(tmp_pat
     for name, problem in (("missing", "could not be read"), ("prose", "could not be read"), ("empty", "no shape")):
         with pytest.raises(ExportError, match=rf"{name}\.step.*{problem}"):
             read_step(tmp_path / f"{name}.step")
+
+
+def test_a_host_that_writes_inches_changes_no_length_of_ours(tmp_path: Path) -> None:
+    box = cq.Workplane().box(4, 4, 4)
+    write_step(box.val().wrapped, tmp_path / "before.step")
+    cq.exporters.export(box, str(tmp_path / "inches.step"), unit="INCH")
+    write_step(box.val().wrapped, tmp_path / "after.step")
+    for name in ("before.step", "after.step"):
+        assert measure(read_step(tmp_path / name))[0] == pytest.approx(4**3)
+    assert measure(read_step(tmp_path / "inches.step"))[0] == pytest.approx((4 * 25.4) ** 3)

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, topology
 from gyroid_cad.kernel.part import measure
-from gyroid_cad.kernel.split import compound_of
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.surface.fit import FitSettings, FittedPatch, fit_patch
 from gyroid_cad.trim.box import Box, TrimmedWall, cut_to_box

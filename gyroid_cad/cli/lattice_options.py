@@ -35,7 +35,9 @@ __all__ = [
 ]
 
 _WALL_OPTIONS = ("thickness", "density", "porosity")
-_OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map", "trim", "keep_islands")
+_OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map")
+# Of a block of cells that is built, not of one that fills a part.
+_CUT_OPTIONS = ("trim", "keep_islands")
 PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
@@ -243,20 +245,21 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         raise click.UsageError(f"Got unexpected extra argument '{config}'; a lattice in a file ends in .toml.")
     fit = fit_of(given)
     require_given(given, "cells")
+    cut = {name: given[name] for name in _CUT_OPTIONS if "trim" in given}
     if any(given[name] is not None for name in PAPER_OPTIONS):
-        mixed = [name for name in _OWN_OPTIONS if given.get(name) not in (None, False)]
+        own_options = (*_OWN_OPTIONS, *cut)
+        mixed = [name for name in own_options if given[name] not in (None, False)]
         if mixed or given["thickness_factor"] is None:
             raise click.UsageError(
                 f"{listed(PAPER_OPTIONS)} are the paper's units: they need {listed(PAPER_OPTIONS[:1])}, and not "
-                f"{listed(mixed or _OWN_OPTIONS)}"
+                f"{listed(mixed or own_options)}"
             )
         units = {name: given[name] for name in PAPER_OPTIONS if given[name] is not None}
         return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
     require_given(given, "cell_size")
     require_one_wall(given)
-    own: dict[str, Any] = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface")}
-    own |= {"trim": given.get("trim"), "keep_islands": bool(given.get("keep_islands"))}
-    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, fit=fit)
+    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface")}
+    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, **cut, fit=fit)
 
 
 def require_one_wall(given: dict[str, Any]) -> None:

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
+from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -175,6 +176,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if (answered := answered_shell(commands, PROGRAM)) is not None:
         return answered
     session = Session()
+    if isinstance(sys.stdout, TextIOWrapper):
+        # A file's name may hold what the terminal has no letters for.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         # Not commands.main: it would put an empty line before the one that says "interrupted".
         with commands.make_context(

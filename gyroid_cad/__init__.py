@@ -19,7 +19,15 @@ from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.meshes import mesh_quality
-    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SelfIntersectionError
+    from gyroid_cad.errors import (
+        ExportError,
+        FitError,
+        GyroidError,
+        IslandsWarning,
+        KernelError,
+        ParameterError,
+        SelfIntersectionError,
+    )
     from gyroid_cad.fields.field import Field
     from gyroid_cad.filling.fill import Filled, FillReport, fill
     from gyroid_cad.lattice import Lattice, LatticeReport
@@ -37,6 +45,7 @@ __all__ = [
     "FitError",
     "FitSettings",
     "GyroidError",
+    "IslandsWarning",
     "KernelError",
     "Lattice",
     "LatticeReport",
@@ -54,7 +63,15 @@ __all__ = [
 
 _HOMES = {
     "builds.meshes": ("mesh_quality",),
-    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"),
+    "errors": (
+        "ExportError",
+        "FitError",
+        "GyroidError",
+        "IslandsWarning",
+        "KernelError",
+        "ParameterError",
+        "SelfIntersectionError",
+    ),
     "fields.field": ("Field",),
     "filling.fill": ("FillReport", "Filled", "fill"),
     "lattice": ("Lattice", "LatticeReport"),

@@ -6,13 +6,15 @@ their edges, and each such group is all inside or all outside: one point tells.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.graph import connected
+from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
@@ -28,6 +30,7 @@ __all__ = [
     "SIDE_SAMPLES",
     "Frame",
     "covering_complex",
+    "first_success",
     "nearest_offsets",
     "patch_sides",
     "periodic_offsets",
@@ -37,6 +40,8 @@ __all__ = [
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
+
+T = TypeVar("T")
 
 OUTSIDE, CROSSING, INSIDE = -1, 0, 1
 # Along each side of a patch, whose middle is among them.
@@ -71,6 +76,28 @@ class Frame:
 
 
 AT_HOME = Frame(np.zeros(3), np.eye(3))
+
+
+def first_success(attempts: Iterable[Callable[[], T]]) -> T:
+    """Return the result of the first attempt at a cut in which the kernel does not fail.
+
+    Parameters
+    ----------
+    attempts : iterable of callable
+        Without arguments: a cut with the lattice as it stands, and with it shifted by :data:`PERTURBATIONS`.
+
+    Raises
+    ------
+    KernelError
+        That of the first attempt, if all fail.
+    """
+    problem: KernelError | None = None
+    for attempt in attempts:
+        try:
+            return attempt()
+        except KernelError as failed:
+            problem = problem or failed
+    raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
 
 
 def covering_complex(

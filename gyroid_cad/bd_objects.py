@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from build123d import Align, BasePartObject, BuildPart, Compound, Location, Mode, Part, RotationLike
+from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, RotationLike
 from build123d.geometry import to_align_offset
 
 from gyroid_cad.common.choices import Kind, SurfaceName, Trim
@@ -77,7 +77,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
             surface,
             keep_islands=keep_islands,
         )
-        part = Part.cast(self.lattice.solid())
+        part = self.lattice.to_build123d()
         if align is not None:
             # The host would measure the box on the kernel's faces; the control nets give it at once.
             part = part.moved(Location(to_align_offset(*self.lattice.bounding_box(), align)))
@@ -132,7 +132,6 @@ class GyroidFill(Part):  # type: ignore[misc]
         filled = fill(subject, cell_size, thickness, density, kind, skin=skin, openings=openings, **settings)
         self.report = filled.report
         self.mode = mode
-        shape = Part.cast(filled.solid())
-        super().__init__(obj=(shape if isinstance(shape, Compound) else Compound([shape])).wrapped)
+        super().__init__(obj=filled.to_build123d().wrapped)
         if context is not None:
             context._add_to_context(self, clean=False, mode=mode)

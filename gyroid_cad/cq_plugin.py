@@ -1,5 +1,7 @@
 """CadQuery: importing this module adds ``Workplane.gyroid`` and ``Workplane.gyroid_fill``, and nothing else.
 
+Type checkers know neither: for them there are :class:`GyroidWorkplane`, and the two as functions of a workplane.
+
 >>> import cadquery as cq
 >>> import gyroid_cad.cq_plugin
 >>> result = cq.Workplane().gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8)
@@ -8,7 +10,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import cadquery as cq
 
@@ -19,11 +21,13 @@ from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
 from gyroid_cad.surface.fit import FitSettings
 
-__all__ = ["gyroid", "gyroid_fill"]
+__all__ = ["GyroidWorkplane", "gyroid", "gyroid_fill"]
+
+Plane = TypeVar("Plane", bound=cq.Workplane)
 
 
 def gyroid(
-    self: cq.Workplane,
+    self: Plane,
     cells: tuple[int, int, int],
     cell_size: float,
     thickness: FieldLike | None = None,
@@ -39,7 +43,7 @@ def gyroid(
     trim: Trim | None = None,
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
-) -> cq.Workplane:
+) -> Plane:
     """A lattice of the gyroid, or of another surface, at each point of the stack.
 
     Parameters
@@ -81,12 +85,13 @@ def gyroid(
     if len(per_axis) != 3:
         raise ParameterError("centered", centered, "True, False or three of them")
     offset = [-(a + b) / 2 if middle else -a for a, b, middle in zip(low, high, per_axis, strict=True)]
-    shape = cq.Shape.cast(lattice.solid()).moved(cq.Location(cq.Vector(*offset)))
-    return self.eachpoint(shape.moved, True, combine, clean)
+    shape = lattice.to_cadquery().moved(cq.Location(cq.Vector(*offset)))
+    made: Plane = self.eachpoint(shape.moved, True, combine, clean)
+    return made
 
 
 def gyroid_fill(
-    self: cq.Workplane,
+    self: Plane,
     cell_size: float | None = None,
     thickness: FieldLike | None = None,
     density: FieldLike | None = None,
@@ -94,7 +99,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     **settings: Any,
-) -> cq.Workplane:
+) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
     As with ``Workplane.shell``, faces that are selected are where the skin is left open:
@@ -125,20 +130,32 @@ def gyroid_fill(
     except ValueError:
         raise ParameterError("part", self, "a chain with a solid in it") from None
     made = fill(part, cell_size, thickness, density, kind, skin=skin, **settings)
-    return self.newObject([cq.Shape.cast(made.solid())])
+    filled: Plane = self.newObject([made.to_cadquery()])
+    return filled
+
+
+class GyroidWorkplane(cq.Workplane):  # type: ignore[misc]
+    """``cadquery.Workplane`` with both methods where type checkers see them; at run time the two are alike.
+
+    >>> GyroidWorkplane().box(12, 9, 8).gyroid_fill(cell_size=8, density=0.3).solids().size()
+    1
+    """
+
+    gyroid = gyroid
+    gyroid_fill = gyroid_fill
 
 
 def _install() -> None:
-    for addition in (gyroid, gyroid_fill):
-        name = addition.__name__
+    additions = {"gyroid": gyroid, "gyroid_fill": gyroid_fill}
+    for name in additions:
         present = getattr(cq.Workplane, name, None)
         if present is not None and getattr(present, "__module__", None) != __name__:
             raise GyroidError(
                 f"cadquery.Workplane.{name} is taken by {getattr(present, '__module__', present)}; "
                 "gyroid_cad.cq_plugin does not replace it"
             )
-    cq.Workplane.gyroid = gyroid
-    cq.Workplane.gyroid_fill = gyroid_fill
+    for name, addition in additions.items():
+        setattr(cq.Workplane, name, addition)
 
 
 _install()

@@ -20,6 +20,7 @@ from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_forma
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import cells_shown
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
 from gyroid_cad.mesh.iga.patches import VolumePatches
@@ -38,7 +39,7 @@ _LENGTH = "a length in mm, a finite number"
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice(LatticeParameters):
+class Lattice(LatticeParameters, HostShapes):
     """A block of cells of the gyroid or another surface: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import cadquery as cq
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 
 import gyroid_cad.cq_plugin
+from gyroid_cad.cq_plugin import GyroidWorkplane
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.makers import linear
 from gyroid_cad.filling.fill import fill
@@ -168,6 +171,7 @@ kept = cq.Workplane.gyroid is theirs
 del cq.Workplane.gyroid
 
 import gyroid_cad.cq_plugin
+from gyroid_cad.cq_plugin import GyroidWorkplane
 importlib.reload(gyroid_cad.cq_plugin)
 changed = [
     [kind.__name__, name]
@@ -246,3 +250,52 @@ def test_chips_at_the_corners_of_whole_cells_are_dropped_unless_they_are_to_be_k
     made = cq.Workplane().gyroid(**GYROID, trim="box", keep_islands=keep)
     filled = cq.Workplane().box(10, 10, 10, centered=False).gyroid_fill(10, 0.8, fit=GYROID["fit"], keep_islands=keep)
     assert len(made.solids().vals()) == len(filled.solids().vals()) == solids
+
+
+TYPED = """
+import cadquery as cq
+from gyroid_cad.cq_plugin import GyroidWorkplane, gyroid, gyroid_fill
+
+block = GyroidWorkplane().box(9, 9, 9)
+chain = block.faces(">Z").gyroid_fill(8, density=0.3, skin=1).gyroid(cells=(1, 1, 1), cell_size=10, thickness=0.8)
+plain = gyroid(gyroid_fill(cq.Workplane().box(9, 9, 9), 8, density=0.3), (1, 1, 1), 10, 0.8)
+reveal_type(chain)
+reveal_type(plain)
+block.gyroid(cells="many", cell_size=10)
+"""
+# What else is imported is left out: reading all of it takes seven times as long.
+TYPING = """
+[mypy]
+ignore_missing_imports = True
+[mypy-numpy.*,scipy.*,OCP.*,vtkmodules.*,ezdxf.*,pyparsing.*,build123d.*,gyroid_cad.*]
+follow_imports = skip
+[mypy-gyroid_cad.cq_plugin]
+follow_imports = silent
+"""
+
+
+def test_a_type_checker_knows_both_methods_and_both_functions(tmp_path: Path) -> None:
+    (tmp_path / "typed.py").write_text(TYPED)
+    (tmp_path / "mypy.ini").write_text(TYPING)
+    run = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", "mypy.ini", "--cache-dir", "cache", "typed.py"],
+        cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(Path(gyroid_cad.__file__).parents[1])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said = run.stdout.splitlines()
+    assert 'typed.py:8: note: Revealed type is "gyroid_cad.cq_plugin.GyroidWorkplane"' in said
+    assert 'typed.py:9: note: Revealed type is "cadquery.cq.Workplane"' in said
+    errors = [line for line in said if "error:" in line and line.startswith("typed.py")]
+    assert len(errors) == 1
+    assert errors[0].startswith('typed.py:10: error: Argument "cells" to "gyroid"')
+
+
+def test_the_typed_workplane_is_cadquerys_with_the_same_methods() -> None:
+    made = GyroidWorkplane().box(12, 9, 8).gyroid_fill(cell_size=8, density=0.3)
+    assert isinstance(made, GyroidWorkplane)
+    plain = cq.Workplane().box(12, 9, 8).gyroid_fill(cell_size=8, density=0.3)
+    assert made.val().Volume() == pytest.approx(plain.val().Volume())
+    assert not isinstance(plain, GyroidWorkplane)

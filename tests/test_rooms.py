@@ -27,7 +27,7 @@ ROWS = [
     ["wall"],
     ["trim", "mesh"],
     ["kernel"],
-    ["builds", "render"],
+    ["builds", "render", "host_shapes"],
     ["lattice"],
     ["filling"],
     ["printing"],
@@ -42,8 +42,8 @@ EXCEPTIONS: dict[tuple[str, str], str] = {}
 # Which rooms or modules may load a heavy package.
 OWNERS = {
     "OCP": ("kernel.",),
-    "cadquery": ("cq_plugin", "cli.viewer"),
-    "build123d": ("bd_objects",),
+    "cadquery": ("cq_plugin", "cli.viewer", "host_shapes"),
+    "build123d": ("bd_objects", "host_shapes"),
     # CadQuery's viewer is made of it, and distances to triangles are asked of it.
     "vtkmodules": ("cli.viewer", "mesh.triangles.measures"),
 }

@@ -63,7 +63,7 @@ class Triangles:
         if any(format_of(path) is THREE_MF for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count
-            require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)))
+            require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)), kernel=False)
         for path in targets:
             stage = f"write {path.name}"
             if format_of(path) is THREE_MF:

@@ -29,7 +29,7 @@ from gyroid_cad.cli.options import (
     quiet_option,
     schema_option,
 )
-from gyroid_cad.cli.print_check import print_check_command
+from gyroid_cad.cli.print_check import check_by, print_check_command
 from gyroid_cad.cli.report import report_command
 from gyroid_cad.cli.view import view_command
 from gyroid_cad.common.files import file_sizes
@@ -101,11 +101,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
         click.echo(printed_options(), nl=False)
         return
     outputs, printer = given["output"], given["printer"]
-    if printer is not None:
-        from gyroid_cad.printing.print_check import print_check
-        from gyroid_cad.printing.printers import printer_named
-
-        printer = printer_named(printer)
+    checked = None if printer is None else check_by(printer)
     settings = {name: given[name] for name in ("schema", "deviation", "angle", "instances")}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
@@ -116,7 +112,7 @@ def build(print_config: bool, as_json: bool, quiet: bool, **given: Any) -> None:
             report = lattice.report(progress)
         else:
             report = lattice.triangle_report(given["deviation"], progress)
-        check = None if printer is None else print_check(lattice, printer, given["deviation"], progress)
+        check = None if checked is None else checked(lattice, given["deviation"], progress)
     summary = _summary(report, outputs, time.perf_counter() - start)
     if check is not None:
         summary["print_check"] = check.as_dict()
@@ -175,13 +171,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 failed, 2 bad usage; an error is one line on stderr.
     """
-    if (answered := answered_shell(commands, PROGRAM)) is not None:
-        return answered
     session = Session()
     if isinstance(sys.stdout, TextIOWrapper):
         # A file's name may hold what the terminal has no letters for.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
+        if (answered := answered_shell(commands, PROGRAM)) is not None:
+            return answered
         # Not commands.main: it would put an empty line before the one that says "interrupted".
         with (
             commands.make_context(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -60,9 +62,14 @@ def print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]])
     from rich.console import Console
     from rich.table import Table
 
+    class Patient(Console):
+        def on_broken_pipe(self) -> None:
+            # Rich would leave at once; what a closed pipe means is for the command line to say, as of all it prints.
+            raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
+
     table = Table(*(header or [""] * len(rows[0])), show_header=header is not None, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
     # In a pipe there is no width to respect: nothing is wrapped.
-    console = Console(highlight=False, markup=False, **({} if sys.stdout.isatty() else {"width": _UNWRAPPED}))  # type: ignore[arg-type]
+    console = Patient(highlight=False, markup=False, **({} if sys.stdout.isatty() else {"width": _UNWRAPPED}))  # type: ignore[arg-type]
     console.print(table)

@@ -9,59 +9,89 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.console import print_report, shown_progress
-from gyroid_cad.cli.lattice_options import density_of, porosity_option, require_one_wall, surface_option
+from gyroid_cad.cli.console import print_check_table, print_report, shown_progress
+from gyroid_cad.cli.lattice_options import (
+    PAPER_OPTIONS,
+    density_of,
+    fit_of,
+    infill_options,
+    lattice_of,
+    listed,
+    printed_options,
+    require_given,
+    require_one_wall,
+    take_defaults,
+)
 from gyroid_cad.cli.options import (
     angle_option,
     deviation_option,
     file_paths,
     json_option,
     output_option,
+    printer_option,
     quiet_option,
     schema_option,
 )
-from gyroid_cad.common.choices import KINDS, Schema
+from gyroid_cad.cli.print_check import check_by
+from gyroid_cad.common.choices import KINDS
 from gyroid_cad.common.files import file_sizes
-from gyroid_cad.common.formats import PART_FORMATS, listed_endings
+from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endings
 
 __all__ = ["fill_command"]
 
+# Of the part and of how it is filled, whatever lattice fills it.
+_OWN = ("kind", "skin", "origin", "rotation", "drop_islands", "keep_islands", "material_density")
+
+
+def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
+    """Return the part among the files, or the one that the TOML file among them names."""
+    parts = [file for file in files if format_of(file) is not TOML]
+    configs = [file for file in files if format_of(file) is TOML]
+    if len(parts) > 1 or len(configs) > 1:
+        raise click.UsageError(f"Got {' '.join(files)}; expected one part and at most one TOML file.")
+    if configs:
+        take_defaults(context, configs[0])
+        if not parts and (named := context.lookup_default("part")):
+            parts = [named]
+    return parts[0] if parts else None
+
 
 @click.command("fill")
-@click.argument("part", metavar="PART.step|PART.brep", shell_complete=file_paths)
-@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.", required=True)
-@surface_option
-@click.option("--cell-size", type=float, required=True, metavar="MM", help="Period of the cubic cell.")
-@click.option(
-    "--thickness",
-    metavar="MM",
-    help='Whole wall: a number, below 0.37647 of the cell size, or an expression such as "0.8 + 0.02*x".',
+@click.argument(
+    "part",
+    nargs=-1,
+    metavar="[PART.step|PART.brep] [FILL.toml]",
+    is_eager=True,
+    callback=_take_files,
+    shell_complete=file_paths,
 )
+@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.")
+@infill_options
 @click.option(
-    "--density", metavar="RHO", help="Volume fraction instead: of the wall, which may be an expression, or a network."
-)
-@porosity_option
-@click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
-@click.option(
-    "--opening",
-    "openings",
-    multiple=True,
-    metavar="FACE",
-    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; "
-    "may be repeated.",
+    "--cells",
+    nargs=3,
+    type=int,
+    metavar="NX NY NZ",
+    help="Fill with a block of so many cells, which --map and --scale-field may carry, and not without end.",
 )
 @click.option(
     "--kind",
     type=click.Choice(KINDS),
     default="sheet",
     show_default=True,
-    help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone.",
+    help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone. A "
+    "network's density is its own.",
+)
+@click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
+@click.option(
+    "--opening",
+    multiple=True,
+    metavar="FACE",
+    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; "
+    "may be repeated.",
 )
 @click.option("--origin", nargs=3, type=float, default=(0, 0, 0), metavar="X Y Z", help="Of the lattice, in mm.")
 @click.option("--rotation", nargs=3, type=float, default=(0, 0, 0), metavar="A B C", help="About x, y, z, in degrees.")
-@click.option(
-    "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side."
-)
 @click.option(
     "--drop-islands",
     is_flag=True,
@@ -73,50 +103,86 @@ __all__ = ["fill_command"]
 @schema_option
 @deviation_option
 @angle_option
+@printer_option("Check as well whether it can make this, such as form2.")
+@click.option("--print-config", is_flag=True, help="Print all of this as TOML, ready for FILL.toml; fill nothing.")
 @json_option
 @quiet_option
 def fill_command(
-    part: str,
+    part: str | None,
     output: tuple[str, ...],
-    control_points: int,
-    schema: Schema,
-    deviation: float | None,
-    angle: float,
-    openings: tuple[str, ...],
+    printer: str | None,
+    print_config: bool,
     as_json: bool,
     quiet: bool,
     **given: Any,
 ) -> None:
     """Fill the solids of a STEP or BREP file with gyroid and write what is left.
 
+    A TOML file has these options as keys, with underscores, and the part as "part"; options given as well override it.
+
     \b
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --skin 1 --opening ">Z"
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
+    gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
+    gyroid-cad fill fill.toml
+    gyroid-cad fill other.step fill.toml -o other_light.step --density 0.25
     """
     start = time.perf_counter()
     from gyroid_cad.builds.solid import require_settings
     from gyroid_cad.common.formats import require_formats
     from gyroid_cad.filling.fill import fill
-    from gyroid_cad.surface.fit import FitSettings
 
-    if given["kind"] != "surface":
-        require_one_wall(given)
+    if part is None:
+        raise click.UsageError("Missing argument 'PART.step': a file, or the key part of FILL.toml.")
+    if not (output or print_config):
+        raise click.UsageError("Missing option '-o' / '--output'.")
+    settings = _settings(given)
+    if print_config:
+        click.echo(printed_options(), nl=False)
+        return
     require_formats(output)
-    require_settings((1, 1, 1), schema, deviation, angle)
+    written = {name: given[name] for name in ("schema", "deviation", "angle")}
+    require_settings((1, 1, 1), **written)
+    checked = None if printer is None else check_by(printer)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        faces = [_face(opening) for opening in openings]
-        given["density"] = density_of(given)
-        del given["porosity"]
-        filled = fill(part, fit=FitSettings(control_points), openings=faces, progress=progress, **given)
-        filled.write(*output, schema=schema, deviation=deviation, angle=angle, progress=progress)
+        filled = fill(part, progress=progress, **settings)
+        filled.write(*output, **written, progress=progress)
+        check = None if checked is None else checked(filled, given["deviation"], progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = file_sizes(output)
+    if check is not None:
+        summary["print_check"] = check.as_dict()
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
         print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
+        if check is not None:
+            print_check_table(check)
+
+
+def _settings(given: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of :func:`gyroid_cad.fill` that the options mean.
+
+    Raises
+    ------
+    click.UsageError, ParameterError
+    """
+    own = {name: given[name] for name in _OWN}
+    own["openings"] = [_face(opening) for opening in given["opening"]]
+    if given["cells"] is not None:
+        return {**own, "lattice": lattice_of(given)}
+    of_blocks = [name for name in (*PAPER_OPTIONS, "scale_field", "map") if given[name] is not None]
+    if of_blocks:
+        raise click.UsageError(
+            f"give {listed(['cells'])} with {listed(of_blocks)}: only a block of cells is scaled or mapped"
+        )
+    require_given(given, "cell_size")
+    if given["kind"] != "surface":
+        require_one_wall(given)
+    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface")}
+    return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
 
 
 def _face(opening: str) -> str | list[float]:

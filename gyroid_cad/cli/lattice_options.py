@@ -2,56 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from gyroid_cad.cli.messages import label, remember_config
-from gyroid_cad.cli.options import file_paths
-from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS, FitName
+from gyroid_cad.cli.messages import config_of, label, remember_config
+from gyroid_cad.cli.options import Decorator, file_paths
+from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS
 from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
     from gyroid_cad.cli.config import Config
     from gyroid_cad.lattice import Lattice
+    from gyroid_cad.surface.fit import FitSettings
 
 __all__ = [
+    "PAPER_OPTIONS",
     "density_of",
+    "fit_of",
+    "infill_options",
     "lattice_of",
     "lattice_options",
     "lattice_options_beside",
+    "listed",
     "options_given",
-    "porosity_option",
     "printed_options",
+    "require_given",
     "require_one_wall",
-    "surface_option",
+    "take_defaults",
 ]
 
 _WALL_OPTIONS = ("thickness", "density", "porosity")
 _OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map", "trim", "keep_islands")
-_PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
+PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
 # Of the files that "build" writes: other commands that take the same lattice pass over them.
 _BUILD_KEYS, _BUILD_FLAGS = ("output", "schema", "deviation", "angle", "instances"), ("instances",)
 # Keys that name files, which a command writes or reads: in the folder of the file that names them.
-_WRITTEN, _READ = ("output", "histogram", "screenshot"), ("printer",)
+_WRITTEN, _READ = ("output", "histogram", "screenshot"), ("part", "printer")
+
+
+def take_defaults(
+    context: click.Context, path: str, passed_over: Collection[str] = (), flags: Collection[str] = ()
+) -> None:
+    """Put a file's values in the place of defaults, so that options on the command line override them.
+
+    Parameters
+    ----------
+    context : click.Context
+    path : str
+    passed_over : collection of str
+        Keys that mean nothing to this command, and are no mistake.
+    flags : collection of str
+        Those among them that are true or false.
+
+    Raises
+    ------
+    ParameterError
+    """
+    from gyroid_cad.cli.config import read_config
+
+    options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
+    own_flags = {name for name, option in options.items() if getattr(option, "is_flag", False)}
+    config = read_config(path, {*options, *passed_over}, {*own_flags, *flags})
+    multiple = [name for name, option in options.items() if getattr(option, "multiple", False)]
+    remember_config(context, config, {key: _default(context, config, key, key in multiple) for key in config.values})
 
 
 def _defaults_from_file(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
-    """Put a file's values in the place of defaults, so that options on the command line override them."""
     if path is not None and format_of(path) is TOML:
-        from gyroid_cad.cli.config import read_config
-
-        options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
-        flags = {name for name, option in options.items() if getattr(option, "is_flag", False)}
-        config = read_config(path, {*options, *_BUILD_KEYS}, {*flags, *_BUILD_FLAGS})
-        multiple = [name for name, option in options.items() if getattr(option, "multiple", False)]
-        remember_config(
-            context, config, {key: _default(context, config, key, key in multiple) for key in config.values}
-        )
+        take_defaults(context, path, _BUILD_KEYS, _BUILD_FLAGS)
     return path
 
 
@@ -64,7 +87,8 @@ def _default(context: click.Context, config: Config, key: str, multiple: bool) -
         if key in _WRITTEN:
             parts = [config.output(key, part, context.params["allow_outside"]) for part in parts]
         elif key in _READ:
-            parts = [config.beside(part) if format_of(part) is TOML else part for part in parts]
+            # A printer that is known has no ending.
+            parts = [config.beside(part) if format_of(part) is not None else part for part in parts]
         return parts if multiple or not isinstance(given, str) else parts[0]
 
     return value
@@ -89,9 +113,8 @@ surface_option = click.option(
 porosity_option = click.option(
     "--porosity", metavar="P", help="Empty part of the volume instead: 1 - density; may be an expression too."
 )
-_OPTIONS = (
+_INFILL_OPTIONS = (
     surface_option,
-    click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z."),
     click.option(
         "--cell-size", type=float, metavar="MM", help="Period of the cubic cell, before it is scaled or mapped."
     ),
@@ -123,15 +146,6 @@ _OPTIONS = (
     click.option("--bc-length", metavar="B", help="The paper's: length of a bounding cell, instead of --cell-size."),
     click.option("--scale", type=float, metavar="MM", help="Millimetres per unit of BC length; 1 if left out."),
     click.option(
-        "--trim", type=click.Choice(TRIMS), help="Cut to the block of cells: flat sides instead of whole patches."
-    ),
-    click.option(
-        "--keep-islands",
-        is_flag=True,
-        help="Of a trimmed lattice: keep small pieces that the cut leaves unconnected, of less than a hundredth of "
-        "what a cell holds.",
-    ),
-    click.option(
         "--tolerance",
         type=float,
         metavar="PART",
@@ -153,6 +167,30 @@ _OPTIONS = (
         help="The paper's own leaves gaps between patches, and is refused with their size.",
     ),
 )
+_OPTIONS = (
+    click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z."),
+    *_INFILL_OPTIONS,
+    click.option(
+        "--trim", type=click.Choice(TRIMS), help="Cut to the block of cells: flat sides instead of whole patches."
+    ),
+    click.option(
+        "--keep-islands",
+        is_flag=True,
+        help="Of a trimmed lattice: keep small pieces that the cut leaves unconnected, of less than a hundredth of "
+        "what a cell holds.",
+    ),
+)
+_outside_option = click.option(
+    "--allow-outside",
+    is_flag=True,
+    is_eager=True,
+    help="Let a TOML file name files to be written that are not in its own folder.",
+)
+
+
+def infill_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of a lattice without end."""
+    return _with_options(function, _INFILL_OPTIONS)
 
 
 def lattice_options(function: Callable[..., None]) -> Callable[..., None]:
@@ -164,15 +202,7 @@ def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callab
     """Add a lattice's options where the argument may be other files as well: those that this text shows."""
 
     def given_to(function: Callable[..., None]) -> Callable[..., None]:
-        for option in reversed(_OPTIONS):
-            function = option(function)
-        outside = click.option(
-            "--allow-outside",
-            is_flag=True,
-            is_eager=True,
-            help="Let a TOML file name files to be written that are not in its own folder.",
-        )
-        function = outside(function)
+        function = _with_options(function, _OPTIONS)
         argument = click.argument(
             "config",
             required=False,
@@ -184,6 +214,12 @@ def lattice_options_beside(files: str) -> Callable[[Callable[..., None]], Callab
         return argument(function)
 
     return given_to
+
+
+def _with_options(function: Callable[..., None], options: Sequence[Decorator]) -> Callable[..., None]:
+    for option in reversed((_outside_option, *options)):
+        function = option(function)
+    return function
 
 
 def options_given(but: Collection[str]) -> list[str]:
@@ -202,25 +238,24 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     """
     from gyroid_cad.lattice import Lattice
 
-    if given["config"] is not None and format_of(given["config"]) is not TOML:
-        raise click.UsageError(f"Got unexpected extra argument '{given['config']}'; a lattice in a file ends in .toml.")
-    fit = _fit_settings(given["fit"], given["control_points"])
-    _require_given(given, "cells")
-    if any(given[name] is not None for name in _PAPER_OPTIONS):
-        mixed = [name for name in _OWN_OPTIONS if given[name] not in (None, False)]
+    config = given.get("config")
+    if config is not None and format_of(config) is not TOML:
+        raise click.UsageError(f"Got unexpected extra argument '{config}'; a lattice in a file ends in .toml.")
+    fit = fit_of(given)
+    require_given(given, "cells")
+    if any(given[name] is not None for name in PAPER_OPTIONS):
+        mixed = [name for name in _OWN_OPTIONS if given.get(name) not in (None, False)]
         if mixed or given["thickness_factor"] is None:
             raise click.UsageError(
-                f"{_listed(_PAPER_OPTIONS)} are the paper's units: they need {_listed(_PAPER_OPTIONS[:1])}, and not "
-                f"{_listed(mixed or _OWN_OPTIONS)}"
+                f"{listed(PAPER_OPTIONS)} are the paper's units: they need {listed(PAPER_OPTIONS[:1])}, and not "
+                f"{listed(mixed or _OWN_OPTIONS)}"
             )
-        units = {name: given[name] for name in _PAPER_OPTIONS if given[name] is not None}
+        units = {name: given[name] for name in PAPER_OPTIONS if given[name] is not None}
         return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
-    _require_given(given, "cell_size")
+    require_given(given, "cell_size")
     require_one_wall(given)
-    own = {
-        name: given[name]
-        for name in ("thickness", "scale_field", "map", "tolerance", "trim", "surface", "keep_islands")
-    }
+    own: dict[str, Any] = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface")}
+    own |= {"trim": given.get("trim"), "keep_islands": bool(given.get("keep_islands"))}
     return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, fit=fit)
 
 
@@ -233,7 +268,7 @@ def require_one_wall(given: dict[str, Any]) -> None:
     """
     named = [name for name in _WALL_OPTIONS if given[name] is not None]
     if len(named) != 1:
-        raise click.UsageError(f"give exactly one of {_listed(named or _WALL_OPTIONS)}")
+        raise click.UsageError(f"give exactly one of {listed(named or _WALL_OPTIONS)}")
 
 
 def density_of(given: dict[str, Any]) -> Any:
@@ -257,21 +292,36 @@ def density_of(given: dict[str, Any]) -> Any:
     return round(1 - porosity, 15)
 
 
-def _require_given(given: dict[str, Any], name: str) -> None:
+def require_given(given: dict[str, Any], name: str) -> None:
+    """Refuse to go on without an option.
+
+    Raises
+    ------
+    click.UsageError
+    """
     if given[name] is None:
-        nor = "" if given["config"] is None else f", and {given['config']} has no key {name}"
-        raise click.UsageError(f"Missing option '{_listed([name])}'{nor}.")
+        config = config_of(click.get_current_context())
+        nor = "" if config is None else f", and {config.path} has no key {name}"
+        raise click.UsageError(f"Missing option '{listed([name])}'{nor}.")
 
 
-def _listed(names: Collection[str], between: str = ", ") -> str:
+def listed(names: Iterable[str]) -> str:
+    """Return options as the user gave them, or would."""
     context = click.get_current_context()
-    return between.join(label(context, name) for name in names)
+    return ", ".join(label(context, name) for name in names)
 
 
-def _fit_settings(fit: FitName, control_points: int) -> Any:
+def fit_of(given: dict[str, Any]) -> FitSettings:
+    """Return how the patch is to be fitted.
+
+    Raises
+    ------
+    ParameterError
+    """
     from gyroid_cad.surface.fit import FitSettings
 
-    if fit == "smooth":
+    control_points = given["control_points"]
+    if given["fit"] == "smooth":
         return FitSettings(control_points)
     settings = FitSettings.paper()
     if control_points != settings.control_points:

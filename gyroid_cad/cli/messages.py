@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +18,29 @@ from gyroid_cad.errors import GyroidError, ParameterError
 if TYPE_CHECKING:
     from gyroid_cad.cli.config import Config
 
-__all__ = ["BAD_USAGE", "FAILED", "INTERRUPTED", "Session", "debug_option", "failed", "label", "remember_config"]
+__all__ = [
+    "BAD_USAGE",
+    "FAILED",
+    "INTERRUPTED",
+    "Session",
+    "config_of",
+    "debug_option",
+    "failed",
+    "label",
+    "remember_config",
+]
 
-FAILED, BAD_USAGE, INTERRUPTED = 1, 2, 130
+# The last as shells say it of a program that wrote into a closed pipe.
+FAILED, BAD_USAGE, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 _CONFIG = "gyroid_cad.config"
+# Parameters of Python that a command calls otherwise, for it takes one after the other.
+_OPTION_OF = {"openings": "opening"}
 # What a parameter may have been reckoned from.
 _GIVEN_AS = {"density": "porosity"}
+_MEMORY = "memory gave out: it takes fewer cells, coarser triangles, or more memory for this process"
+_UNWRITTEN = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EBADF)
+# What the system says, in an ImportError, when a library finds no room.
+_NO_ROOM = ("cannot allocate memory", "failed to map segment")
 # Of a number of thousands of digits the beginning tells.
 _LONGEST_WORD, _SHOWN_OF_IT = 1000, 100
 
@@ -66,6 +87,11 @@ def remember_config(context: click.Context, config: Config, defaults: dict[str, 
     context.default_map = defaults
 
 
+def config_of(context: click.Context) -> Config | None:
+    """Return the file that a command takes its defaults from, if it takes any."""
+    return context.meta.get(_CONFIG)
+
+
 def label(context: click.Context | None, parameter: str) -> str:
     """Name a parameter as the user gave it: an option, or the line and key of a file.
 
@@ -77,14 +103,19 @@ def label(context: click.Context | None, parameter: str) -> str:
         As the options call it in Python.
     """
     known = {} if context is None else {option.name: option for option in context.command.params}
-    option = known.get(parameter)
-    if context is None or not isinstance(option, click.Option):
+    option = known.get(_OPTION_OF.get(parameter, parameter))
+    if context is None or option is None or option.name is None:
         return parameter
+    parameter = option.name
+    config = config_of(context)
+    if isinstance(option, click.Argument):
+        return config.place(parameter) if config is not None and parameter in config.values else parameter
     other = _GIVEN_AS.get(parameter)
     if context.params.get(parameter) is None and other is not None and context.params.get(other) is not None:
         return f"{label(context, other)}: {parameter}"
     if context.get_parameter_source(parameter) == click.core.ParameterSource.DEFAULT_MAP:
-        return str(context.meta[_CONFIG].place(parameter))
+        assert config is not None
+        return config.place(parameter)
     return option.opts[0]
 
 
@@ -102,11 +133,14 @@ def failed(problem: Exception | KeyboardInterrupt, program: str, session: Sessio
     int
         The status to leave with.
     """
-    if session.debug:
-        click.echo("".join(traceback.format_exception(problem)), err=True, nl=False)
     message, status = _message(problem, session.context)
     words = [word if len(word) <= _LONGEST_WORD else f"{word[:_SHOWN_OF_IT]}..." for word in message.split()]
-    click.echo(f"{program}: error: {' '.join(words)}", err=True)
+    # Where nobody listens on the error stream either, the status has to do.
+    with suppress(OSError):
+        if session.debug:
+            click.echo("".join(traceback.format_exception(problem)), err=True, nl=False)
+        if words:
+            click.echo(f"{program}: error: {' '.join(words)}", err=True)
     return status
 
 
@@ -119,6 +153,20 @@ def _message(problem: Exception | KeyboardInterrupt, context: click.Context | No
         return "interrupted", INTERRUPTED
     if isinstance(problem, GyroidError):
         return str(problem), FAILED
+    return _of_system(problem)
+
+
+def _of_system(problem: BaseException) -> tuple[str, int]:
+    """Message of an error that is none of ours, nor of what the user gave."""
+    if _ran_out_of_memory(problem):
+        return _MEMORY, FAILED
+    # Files are written by name, and then it is an ExportError: what is left is what is printed.
+    if isinstance(problem, OSError) and problem.filename is None and problem.errno in _UNWRITTEN:
+        _discard_output()
+        if problem.errno == errno.EPIPE:
+            # Whoever read it has had enough, as `head` has: nothing went wrong that anybody needs to be told.
+            return "", PIPE_CLOSED
+        return f"standard output could not be written: {problem.strerror}", FAILED
     # A defect of ours is still one line for the user.
     return f"unexpected {type(problem).__name__}: {problem}", FAILED
 
@@ -139,6 +187,27 @@ def _of_parameter(problem: ParameterError, context: click.Context | None) -> str
     if not all(name.isidentifier() for name in names):
         return str(problem)
     return str(problem).replace(problem.parameter, ", ".join(label(context, name) for name in names), 1)
+
+
+def _discard_output() -> None:
+    """Send what is left of standard output nowhere: Python writes it when it leaves, and would complain again."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+
+
+def _ran_out_of_memory(problem: BaseException | None) -> bool:
+    """Tell whether it is memory that an error is about: the kernel's has a class of its own, a library's none."""
+    while problem is not None:
+        if isinstance(problem, OSError) and problem.errno == errno.ENOMEM:
+            return True
+        if isinstance(problem, MemoryError) or type(problem).__name__ == "Standard_OutOfMemory":
+            return True
+        if isinstance(problem, ImportError) and any(words in str(problem).lower() for words in _NO_ROOM):
+            return True
+        problem = problem.__cause__ or problem.__context__
+    return False
 
 
 def _was_interrupted(problem: BaseException | None) -> bool:

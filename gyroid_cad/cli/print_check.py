@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,9 +15,28 @@ from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, o
 from gyroid_cad.cli.options import json_option, printer_option
 from gyroid_cad.common.formats import TOML, TRIANGLE_FORMATS, format_of, require_format
 
-__all__ = ["print_check_command"]
+if TYPE_CHECKING:
+    from gyroid_cad.common.progress import Progress
+    from gyroid_cad.printing.print_check import PrintCheck
+
+__all__ = ["check_by", "print_check_command"]
 
 _HOW = ("printer", "deviation", "as_json", "quiet", "config")
+
+
+def check_by(printer: str) -> Callable[[Any, float | None, Progress | None], PrintCheck]:
+    """Return what checks a part by a printer of a name, or of a file, which is read at once.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such printer.
+    """
+    from gyroid_cad.printing.print_check import print_check
+    from gyroid_cad.printing.printers import printer_named
+
+    chosen = printer_named(printer)
+    return lambda part, deviation, progress: print_check(part, chosen, deviation, progress)
 
 
 @click.command("print-check")
@@ -41,10 +61,7 @@ def print_check_command(
     gyroid-cad print-check --cells 4 4 4 --cell-size 12 --thickness 0.8
     """
     start = time.perf_counter()
-    from gyroid_cad.printing.print_check import print_check
-    from gyroid_cad.printing.printers import printer_named
-
-    chosen, file = printer_named(printer), given["config"]
+    checked, file = check_by(printer), given["config"]
     part: Any = file
     if file is None or format_of(file) is TOML:
         part = lattice_of(given)
@@ -54,7 +71,7 @@ def print_check_command(
         if described:
             raise click.UsageError(f"{file} is a part already: none of {', '.join(described)}")
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        check = print_check(part, chosen, deviation, progress)
+        check = checked(part, deviation, progress)
     if as_json:
         click.echo(json.dumps({**check.as_dict(), "seconds": time.perf_counter() - start}))
     elif not quiet:

@@ -16,7 +16,7 @@ from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
@@ -24,6 +24,7 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
@@ -131,7 +132,7 @@ class FillReport:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filled:
+class Filled(HostShapes):
     """A filled part.
 
     Attributes
@@ -165,6 +166,18 @@ class Filled:
     def __str__(self) -> str:
         return str(self.report)
 
+    def deviation(self, given: float | None = None) -> float:
+        """Return the largest distance of triangles from the faces, in mm: the usual one if none is given.
+
+        Raises
+        ------
+        ParameterError
+        """
+        usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
+        limit = usual if given is None else finite_number("deviation", given)
+        require_meshing(limit)
+        return limit
+
     def write(
         self,
         *paths: str | os.PathLike[str],
@@ -180,8 +193,7 @@ class Filled:
         ParameterError, ExportError
         """
         targets = require_formats(paths)
-        usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
-        limit = usual if deviation is None else finite_number("deviation", deviation)
+        limit = self.deviation(deviation)
         require_settings((1, 1, 1), schema, limit, angle)
         for path in targets:
             if not self.report.closed and format_of(path) in TRIANGLE_FORMATS:

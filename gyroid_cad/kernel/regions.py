@@ -16,12 +16,12 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
-from OCP.TopoDS import (
-    TopoDS_Shape,
-)
+from OCP.Standard import Standard_OutOfMemory
+from OCP.TopoDS import TopoDS_Shape
 
+from gyroid_cad.common.processes import end_with_parent
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.region_merge import Joining
@@ -42,8 +42,8 @@ def split_by_region(
 ) -> Pieces:
     """Split a part's boundary and faces where they cross, as ``split`` does, in several processes.
 
-    The result does not depend on how many processes there are, if more than one: then, and if there are many faces,
-    and processes can be forked, it is made region by region; else ``split`` makes it.
+    The result does not depend on how many there are: where there is one processor, or processes cannot be forked, one
+    region is split after the other. Only few faces are split all at once.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def split_by_region(
     faces : sequence of TopoDS_Shape
         Faces that share their edges.
     processes : int, optional
-        As many as there are processors to run on, if left out.
+        As many as there are processors to run on, if left out; with 1, what ``split`` gives.
     progress : callable, optional
         Called now and then with (faces done, faces in all).
 
@@ -60,14 +60,15 @@ def split_by_region(
     KernelError
         If the kernel fails, or a process.
     """
-    usable = _processors() if processes is None else processes
-    if len(faces) < _FEW or usable < 2 or not _can_fork():
+    if len(faces) < _FEW or processes == 1:
         pieces = split(part, faces)
         if progress is not None:
             progress(len(faces), len(faces))
         return pieces
     task = Task(part, faces)
-    found = _found_in_processes(task, usable, progress)
+    usable = _processors() if processes is None else processes
+    find = _found_in_processes if usable > 1 and _can_fork() else _found_here
+    found = find(task, usable, progress)
     with _kernel_errors():
         return Joining(task, found).pieces()
 
@@ -77,8 +78,20 @@ def _processors() -> int:
 
 
 def _can_fork() -> bool:
-    # On macOS there is fork, but system libraries may crash in the forked process.
-    return sys.platform != "darwin" and "fork" in multiprocessing.get_all_start_methods()
+    # Elsewhere they could outlive this process; on macOS system libraries may crash in them. And a process of a pool,
+    # which ends with its parent, may have none of its own.
+    return sys.platform == "linux" and not multiprocessing.current_process().daemon
+
+
+def _found_here(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
+    """What is found in each region, one after the other."""
+    found, done = [], 0
+    for region in task.regions:
+        found.append(_found_in(task, region))
+        done += len(region)
+        if progress is not None:
+            progress(done, len(task.faces))
+    return found
 
 
 # What a process was started for.
@@ -86,14 +99,14 @@ _inherited: list[Task] = []
 
 
 def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
-    """Pieces found in each region."""
+    """What is found in each region."""
     before = multiprocessing.active_children()
     executor = ProcessPoolExecutor(
         min(processes, len(task.regions)),
         multiprocessing.get_context("fork"),
         # Not sent: a forked process has it already.
         initializer=_begin,
-        initargs=(task,),
+        initargs=(task, os.getpid()),
     )
     done = 0
     try:
@@ -105,16 +118,20 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
             if progress is not None:
                 progress(done, len(task.faces))
         return [future.result() for future in futures]
-    except KeyboardInterrupt:
-        # Nobody waits for what the kernel is at.
-        for process in multiprocessing.active_children():
-            if process not in before:
-                process.terminate()
-        raise
     except BrokenProcessPool as broken:
         raise KernelError("a process that split the part against the lattice ended too soon") from broken
+    except BaseException as problem:
+        # Nobody waits for what the kernel is at; and if not all could be started, the others would wait for ever.
+        for process in multiprocessing.active_children():
+            if process not in before:
+                process.kill()
+        if isinstance(problem, RuntimeError | OSError) and not isinstance(problem, KernelError):
+            raise KernelError(f"no processes could be started to split the part: {problem}") from problem
+        raise
     finally:
-        executor.shutdown(cancel_futures=True)
+        # If none could be started there is no thread of the pool's to wait for.
+        with suppress(RuntimeError):
+            executor.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -133,16 +150,23 @@ def _interrupts_later() -> Iterator[None]:
         signal.raise_signal(signal.SIGINT)
 
 
-def _begin(task: Task) -> None:
+def _begin(task: Task, parent: int) -> None:
     """Make a process ready; a terminal interrupts all of a program's processes, and only the first has an answer."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # What the program answers to being ended is nothing that its processes should do.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent(parent)
     _inherited.append(task)
 
 
 def _found(number: int) -> Found:
     (task,) = _inherited
+    return _found_in(task, task.regions[number])
+
+
+def _found_in(task: Task, region: Sequence[int]) -> Found:
     with _kernel_errors():
-        return RegionSplit(task, task.regions[number]).found()
+        return RegionSplit(task, region).found()
 
 
 @contextmanager
@@ -150,7 +174,9 @@ def _kernel_errors() -> Iterator[None]:
     """Errors of the kernel as ours: they have no class in common, and cannot be sent from one process to another."""
     try:
         yield
-    except KernelError:
+    except (KernelError, MemoryError):
         raise
+    except Standard_OutOfMemory as failed:
+        raise MemoryError(str(failed)) from failed
     except Exception as failed:
         raise KernelError(f"the kernel could not split the part against the lattice: {failed}") from failed

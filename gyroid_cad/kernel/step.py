@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
+from threading import RLock
 from types import MappingProxyType
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
-from OCP.Message import Message, Message_Gravity
+from OCP.Message import Message
 from OCP.StepBasic import StepBasic_Product
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
@@ -100,9 +101,7 @@ def step_of_kernel(
         # Of an assembly: the names of the faces of its parts.
         "write.stepcaf.subshapes.name": 1,
     }
-    # The first writer of a process registers the settings; the schema counts when a model is made.
-    STEPCAFControl_Writer()
-    with replacing(path) as temporary, _kernel_settings(settings), _silenced_messages():
+    with replacing(path) as temporary, no_messages(), _kernel_settings(settings):
         raw = temporary.with_name(f"{temporary.name}.raw")
         try:
             yield raw
@@ -167,6 +166,8 @@ def _name_product(writer: STEPControl_Writer, product: str) -> None:
 @contextmanager
 def _kernel_settings(settings: Mapping[str, str | int]) -> Iterator[None]:
     """Set ``Interface_Static`` values, which are global to the process, and put the old ones back."""
+    # The first writer of a process registers the settings; the schema counts when a model is made.
+    STEPCAFControl_Writer()
     before: dict[str, str | int] = {}
     try:
         for key, value in settings.items():
@@ -186,28 +187,25 @@ def _kernel_settings(settings: Mapping[str, str | int]) -> Iterator[None]:
 
 
 @contextmanager
-def _silenced_messages() -> Iterator[None]:
-    """Keep the translators' statistics off the user's terminal; warnings and failures still come through."""
-    printers = list(Message.DefaultMessenger_s().Printers())
-    levels = [printer.GetTraceLevel() for printer in printers]
-    try:
-        for printer in printers:
-            printer.SetTraceLevel(Message_Gravity.Message_Alarm)
-        yield
-    finally:
-        for printer, level in zip(printers, levels, strict=True):
-            printer.SetTraceLevel(level)
-
-
-@contextmanager
 def no_messages() -> Iterator[None]:
-    """Keep all that the kernel says to itself: what is wrong with a file is ours to tell."""
+    """Take the kernel's turn, and keep all that it says to itself: what is wrong with a file is ours to tell.
+
+    It speaks on standard output, where JSON may be expected. Its messengers and settings are the process's own: of the
+    threads that want to read or write one does at a time.
+    """
     messenger = Message.DefaultMessenger_s()
-    printers = list(messenger.Printers())
-    try:
-        for printer in printers:
-            messenger.RemovePrinter(printer)
-        yield
-    finally:
-        for printer in printers:
-            messenger.AddPrinter(printer)
+    with _turn:
+        printers = list(messenger.Printers())
+        try:
+            for printer in printers:
+                messenger.RemovePrinter(printer)
+            yield
+        finally:
+            for printer in printers:
+                messenger.AddPrinter(printer)
+
+
+_turn = RLock()
+if hasattr(os, "register_at_fork"):
+    # A process that is forked while another thread writes would wait for its turn for ever.
+    os.register_at_fork(before=_turn.acquire, after_in_parent=_turn.release, after_in_child=_turn.release)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from dataclasses import asdict, dataclass
 from itertools import permutations
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.graph import connected
 from gyroid_cad.common.formats import require_meshing
+from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import text_table
 from gyroid_cad.errors import ParameterError
@@ -22,6 +22,10 @@ from gyroid_cad.printing.printers import Printer, printer_named
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.pore_limits import narrowest_opening, pore_limiting_diameter
 
+if TYPE_CHECKING:
+    from gyroid_cad.filling.fill import FillReport
+    from gyroid_cad.kernel.solid import KernelShape
+
 __all__ = ["PrintCheck", "print_check", "trapped_voids"]
 
 # At how many places the walls of a part that is known by its triangles alone are measured.
@@ -29,6 +33,18 @@ _WALLS_MEASURED = 4000
 _UNITS = "STL in mm (STL has no unit: PreForm takes mm), 3MF says mm itself"
 # A part as long as the build volume, but for rounding, fits.
 _ROUNDING = 1e-9
+
+
+@runtime_checkable
+class FilledPart(Protocol):
+    """Stands for :class:`gyroid_cad.Filled`, which is loaded with the kernel; files of triangles need none."""
+
+    @property
+    def report(self) -> FillReport: ...
+
+    def solid(self) -> KernelShape: ...
+
+    def deviation(self, given: float | None = None) -> float: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,26 +203,26 @@ class PrintCheck:
 
 
 def print_check(
-    part: Lattice | str | os.PathLike[str] | tuple[NDArray[np.floating], NDArray[np.integer]],
+    part: Lattice | FilledPart | str | os.PathLike[str] | tuple[NDArray[np.floating], NDArray[np.integer]],
     printer: str | Printer = "form2",
     deviation: float | None = None,
     progress: Progress | None = None,
 ) -> PrintCheck:
     """Check whether a printer can make a part.
 
-    Of a lattice the smallest wall is known, and the channels' opening is worked out from the exact surface. Of
-    triangles the walls are measured through them, straight from one side to one that faces away, at some thousands of
-    places. Pieces are what is connected; layers that begin in mid-air, which depend on how the part is turned, are
-    for the printer's own program to find.
+    Of a lattice or a filled part the smallest wall is known, and of a lattice the channels' opening is worked out from
+    the exact surface. Of triangles the walls are measured through them, straight from one side to one that faces away,
+    at some thousands of places. Pieces are what is connected; layers that begin in mid-air, which depend on how the
+    part is turned, are for the printer's own program to find.
 
     Parameters
     ----------
-    part : Lattice, path-like, or (vertices, triangles)
-        A lattice; an STL or 3MF file; or arrays of shapes (v, 3), in mm, and (t, 3).
+    part : Lattice, Filled, path-like, or (vertices, triangles)
+        A lattice; a filled part; an STL or 3MF file; or arrays of shapes (v, 3), in mm, and (t, 3).
     printer : str or Printer
         A key of ``gyroid_cad/printing/printers.toml``, or the path of a TOML file of one's own.
     deviation : float, optional
-        Of a lattice's triangles, in mm, as of :meth:`gyroid_cad.Lattice.write`.
+        Of the triangles of a lattice or a filled part, in mm, as of :meth:`gyroid_cad.Lattice.write`.
     progress : callable, optional
         Called with (stage, done, total).
 
@@ -223,13 +239,24 @@ def print_check(
         require_meshing(deviation)
     if isinstance(part, Lattice):
         return _check_lattice(part, chosen, deviation, progress)
-    if isinstance(part, tuple):
+    vertices: NDArray[np.floating]
+    triangles: NDArray[np.integer]
+    min_wall: float | None = None
+    if isinstance(part, FilledPart):
+        if not part.report.closed:
+            raise ParameterError("kind", part.report.kind, "one that is a solid: a bare surface cannot be printed")
+        vertices, triangles = _triangles_of(part.solid(), part.deviation(deviation))
+        min_wall = part.report.min_wall
+    elif isinstance(part, tuple):
         vertices, triangles = part
     elif isinstance(part, str | os.PathLike):
         vertices, triangles = read_triangles(part)
     else:
-        raise ParameterError("part", part, "a Lattice, an STL or 3MF file, or arrays of vertices and triangles")
+        accepted = "a Lattice, a filled part, an STL or 3MF file, or arrays of vertices and triangles"
+        raise ParameterError("part", part, accepted)
     found = triangle_measures(vertices, triangles)
+    if min_wall is not None:
+        return _checked(chosen, found.high - found.low, min_wall, 0, None, found)
     walls = measured_walls(vertices, triangles, _WALLS_MEASURED)
     smallest = float(walls[0]) if len(walls) else None
     return _checked(chosen, found.high - found.low, smallest, len(walls), None, found)
@@ -246,15 +273,20 @@ def _check_lattice(
         else narrowest_opening(fitted.wall, grading, lattice.cells)
     )
     if fitted.spec.trimmed:
-        from gyroid_cad.kernel.stl import meshed
-
         limit = min(lattice.cell_size / 1000, fitted.min_thickness / 10) if deviation is None else deviation
-        found = triangle_measures(*meshed(lattice.solid(progress), "triangles", limit))
+        found = triangle_measures(*_triangles_of(lattice.solid(progress), limit))
         return _checked(printer, found.high - found.low, fitted.min_thickness, 0, opening, found)
     low, high = fitted.bounding_box()
     count = lattice.triangles(deviation, progress).triangulation.triangle_count
     voids, pieces = trapped_voids(fitted.complex), fitted.complex.component_count
     return _checked(printer, high - low, fitted.min_thickness, 0, opening, (voids, pieces, count))
+
+
+def _triangles_of(shape: KernelShape, deviation: float) -> tuple[NDArray[np.floating], NDArray[np.integer]]:
+    # The kernel is loaded only where a shape of it is checked: not for files of triangles.
+    from gyroid_cad.kernel.stl import meshed
+
+    return meshed(shape, "triangles", deviation)
 
 
 def trapped_voids(complex: CellComplex) -> int:

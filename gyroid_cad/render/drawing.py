@@ -18,7 +18,7 @@ from gyroid_cad.render.facets import Facets
 from gyroid_cad.render.picture import CAMERA, SIZE, Vector, view_axes
 from gyroid_cad.render.raster import NOTHING, nearest_triangles, slopes
 
-__all__ = ["draw", "snug_size"]
+__all__ = ["bounds", "draw", "projection", "snug_size"]
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -33,15 +33,14 @@ _FINER = 3
 _COLOUR_STEP = 3
 # Samples, and triangles, in one go: neither large pictures nor many triangles take more memory than about 1 GB.
 _SAMPLES, _TRIANGLES = 8_000_000, 500_000
-# Light from everywhere, from the sky, and from a lamp over the viewer's left shoulder (right, up, towards the viewer).
-_AMBIENT, _SKY, _LAMP = 0.5, 0.18, 0.42
+# Light on what is turned away from the lamp, and how much more on what faces it; the lamp hangs over the viewer's left
+# shoulder (right, up, towards the viewer).
+_SHADE, _LAMP = 0.5, 0.62
 _DIRECTION = np.array([-0.45, 0.6, 0.66]) / np.linalg.norm([-0.45, 0.6, 0.66])
 # How much darker a sample is on an outline or a sharp edge, beside it, and where two faces meet smoothly.
 _EDGE, _BESIDE, _SMOOTH = 0.75, 0.4, 0.25
-# Cosine of the angle between neighbouring triangles from which on an edge is sharp.
-_SHARP = 0.82
-# Of depth between neighbouring samples, above what their triangles' slopes explain, in samples.
-_JUMP = 2.0
+# Of depth between neighbouring samples, beyond what their triangles' slopes explain, in samples.
+_JUMP = 8.0
 # In parts of the length of what is drawn: its width, at least.
 _THINNEST = 1e-6
 _NO_LENGTH = float(np.finfo(float).tiny)
@@ -71,24 +70,18 @@ def draw(pieces: Sequence[Facets], size: tuple[int, int] = SIZE, camera: Vector 
     >>> image.shape, int((image[..., 3] == 255).sum())
     ((100, 100, 4), 9216)
     """
-    axes = view_axes(camera)
-    samples = _FINER * np.array(size)
-    low, high = _bounds(pieces, axes)
-    usable = samples - 2 * _MARGIN * samples.min()
-    # A line or a point fills nothing.
-    least = _THINNEST * float(np.max(high - low)) or 1.0
-    scale = float(np.min(usable / np.maximum(high - low, least)[:2]))
-    # To the right, down, and towards the viewer.
-    matrix = axes * np.array([[scale], [-scale], [scale]])
-    offset = np.array([*samples / 2, 0]) - (low + high) / 2 * (scale, -scale, scale)
-    rows = max(_SAMPLES // (_FINER * int(samples[0])), 1)
+    matrix, offset = projection(pieces, size, camera)
+    width = _FINER * size[0]
+    # Samples, to the right, down, and towards the viewer.
+    matrix, offset = _FINER * matrix, _FINER * offset
+    rows = max(_SAMPLES // (_FINER * width), 1)
     bands = []
     for top in range(0, size[1], rows):
         bottom = min(top + rows, size[1])
         # With a pixel above and below, for the lines that come from there.
         above, height = _FINER * (top - 1), _FINER * (bottom - top + 2)
-        scene, seen = _visible(pieces, matrix, offset - (0, above, 0), int(samples[0]), height)
-        bands.append(_pixels(scene, seen, int(samples[0]), axes)[1:-1])
+        scene, seen = _visible(pieces, matrix, offset - (0, above, 0), width, height)
+        bands.append(_pixels(scene, seen, width, view_axes(camera))[1:-1])
     return np.concatenate(bands)
 
 
@@ -102,13 +95,48 @@ def snug_size(pieces: Sequence[Facets], camera: Vector, longest: int) -> tuple[i
     longest : int
         The longer of the two.
     """
-    low, high = _bounds(pieces, view_axes(camera))
+    low, high = bounds(pieces, view_axes(camera))
     extent = (high - low)[:2]
     usable = longest * (1 - 2 * _MARGIN)
     shorter = usable * float(extent.min()) / (float(extent.max()) or 1.0)
     # The margin is a part of the shorter side.
     other = max(int(np.ceil(shorter / (1 - 2 * _MARGIN))), 1)
     return (longest, other) if extent[0] >= extent[1] else (other, longest)
+
+
+def projection(pieces: Sequence[Facets], size: tuple[int, int], camera: Vector) -> tuple[Floats, Floats]:
+    """Matrix and offset that take points to pixels, as :func:`draw` does: to the right, down, and towards the viewer.
+
+    Parameters
+    ----------
+    pieces : sequence of Facets
+        They fill the picture, but for a margin.
+    size : tuple of int
+    camera : tuple of float
+
+    Returns
+    -------
+    matrix : ndarray, shape (3, 3)
+    offset : ndarray, shape (3,)
+    """
+    axes, pixels = view_axes(camera), np.array(size)
+    low, high = bounds(pieces, axes)
+    usable = pixels - 2 * _MARGIN * pixels.min()
+    # A line or a point fills nothing.
+    least = _THINNEST * float(np.max(high - low)) or 1.0
+    scale = float(np.min(usable / np.maximum(high - low, least)[:2])) * np.array([1, -1, 1])
+    return axes * scale[:, np.newaxis], np.array([*pixels / 2, 0]) - (low + high) / 2 * scale
+
+
+def bounds(pieces: Sequence[Facets], axes: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates along some axes, rows of a matrix."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for piece in pieces:
+        points = piece.corners.reshape(-1, 3)
+        for place in piece.places:
+            along = points @ (axes @ place[:, :3]).T + axes @ place[:, 3]
+            low, high = np.minimum(low, along.min(axis=0)), np.maximum(high, along.max(axis=0))
+    return low, high
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,19 +147,18 @@ class _Scene:
     ----------
     corners : ndarray, shape (n, 3, 3)
         In samples: to the right, down, and towards the viewer.
-    flat : ndarray, shape (n, 3)
-        Unit normals towards the viewer, in the same axes.
     normals : ndarray, shape (n, 3, 3)
         At the corners, as they are in space, on the side that is seen.
     colours : ndarray, shape (n, 3, 3)
-    faces : ndarray of int, shape (n,)
+    faces, surfaces : ndarray of int, shape (n,)
+        Apart for each place.
     """
 
     corners: Floats
-    flat: Floats
     normals: Floats
     colours: Floats
     faces: Integers
+    surfaces: Integers
 
     def some(self, which: Integers) -> _Scene:
         return _Scene(*(getattr(self, name)[which] for name in _PARTS))
@@ -142,17 +169,6 @@ _PARTS = tuple(field.name for field in fields(_Scene))
 
 def _together(scenes: Sequence[_Scene]) -> _Scene:
     return _Scene(*(np.concatenate([getattr(scene, name) for scene in scenes]) for name in _PARTS))
-
-
-def _bounds(pieces: Sequence[Facets], axes: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest coordinates along some axes."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for piece in pieces:
-        points = piece.corners.reshape(-1, 3)
-        for place in piece.places:
-            along = points @ (axes @ place[:, :3]).T + axes @ place[:, 3]
-            low, high = np.minimum(low, along.min(axis=0)), np.maximum(high, along.max(axis=0))
-    return low, high
 
 
 def _visible(
@@ -179,40 +195,41 @@ def _visible(
 
 def _portions(pieces: Sequence[Facets], matrix: Floats, offset: Floats, height: int) -> Iterator[_Scene]:
     """Triangles in their places, so far as they may be seen, not too many at once."""
-    face = 0
+    taken = 0
     for piece in pieces:
-        faces = int(piece.faces.max(initial=0)) + 1
+        numbers = int(max(piece.faces.max(initial=0), piece.surfaces.max(initial=0))) + 1
         at_once = max(_TRIANGLES // max(len(piece.faces), 1), 1)
         for start in range(0, len(piece.places), at_once):
             parts = []
             for place in piece.places[start : start + at_once]:
-                parts.append(_placed(piece, matrix @ place[:, :3], matrix @ place[:, 3] + offset, place, face, height))
-                face += faces
+                parts.append(_placed(piece, matrix @ place[:, :3], matrix @ place[:, 3] + offset, place, taken, height))
+                taken += numbers
             yield _together(parts)
 
 
-def _placed(piece: Facets, matrix: Floats, offset: Floats, place: Floats, face: int, height: int) -> _Scene:
+def _placed(piece: Facets, matrix: Floats, offset: Floats, place: Floats, first: int, height: int) -> _Scene:
     corners = piece.corners @ matrix.T + offset
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # The picture's axes are left-handed: outward normals point away.
-    turned = np.sign(-flat[:, 2])
+    (x0, y0, _), (x1, y1, _), (x2, y2, _) = corners.transpose(1, 2, 0)
+    # Down the picture is the other way round.
+    turned = -np.sign((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
     # Nobody sees closed surfaces from behind.
     kept = turned > 0 if piece.closed else turned != 0
     kept &= (corners[..., 1].max(axis=1) > 0) & (corners[..., 1].min(axis=1) < height)
-    side = turned[kept, np.newaxis]
     return _Scene(
         corners[kept],
-        _unit(flat[kept]) * -side,
-        (piece.normals[kept] @ place[:, :3].T) * side[:, np.newaxis],
+        # Others are lit on the side that is seen.
+        piece.normals[kept] @ place[:, :3].T * turned[kept, np.newaxis, np.newaxis],
         piece.colours[kept],
-        piece.faces[kept] + face,
+        piece.faces[kept] + first,
+        piece.surfaces[kept] + first,
     )
 
 
 def _pixels(scene: _Scene, seen: Integers, width: int, axes: Floats) -> Bytes:
     """Samples lit, lined, and averaged to pixels."""
     normals = _unit(scene.normals) @ axes.T
-    light = _AMBIENT + _SKY * (1 + normals[..., 1]) / 2 + _LAMP * np.maximum(dot(normals, _DIRECTION), 0)
+    # Round the whole sphere of normals, so that what is in the shade has its shape too.
+    light = _SHADE + _LAMP * (1 + dot(normals, _DIRECTION)) / 2
     lit = slopes(scene.corners, scene.colours * light[..., np.newaxis])
     hit = np.flatnonzero(seen != NOTHING)
     row, column = np.divmod(hit, width)
@@ -242,12 +259,12 @@ def _ink(scene: _Scene, seen: Integers, hit: Integers, width: int) -> Singles:
         outline = (seen[here] == NOTHING) | (seen[there] == NOTHING)
         one, other = seen[here], seen[there]
         change = place[there] - place[here]
-        unexplained = np.minimum(np.abs(change - slope[one]), np.abs(change - slope[other]))
-        # Where a curved surface turns away from the viewer its triangles' slopes differ much.
-        jump = unexplained > _JUMP + np.minimum(np.abs(slope[one]), np.abs(slope[other]))
-        turn = dot(scene.flat[one], scene.flat[other]) < _SHARP
+        low, high = np.minimum(slope[one], slope[other]), np.maximum(slope[one], slope[other])
+        # One curved surface falls by something between its slopes here and there.
+        jump = np.maximum(low - change, change - high) > _JUMP + np.minimum(np.abs(low), np.abs(high)) / 2
+        sharp_edge = scene.surfaces[one] != scene.surfaces[other]
         meeting = scene.faces[one] != scene.faces[other]
-        for lines, kind in ((outline | jump | turn, sharp), (meeting, smooth)):
+        for lines, kind in ((outline | jump | sharp_edge, sharp), (meeting, smooth)):
             kind[here[lines]] = True
             kind[there[lines]] = True
     beside = sharp.copy()

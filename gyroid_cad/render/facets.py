@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.common.graph import connected
 from gyroid_cad.nurbs.surface import grid_derivatives
 from gyroid_cad.wall.offset import SIDES, Wall
 
@@ -46,8 +47,9 @@ class Facets:
         At the corners, out of the solid; of any length but zero.
     colours : ndarray, shape (n, 3, 3)
         At the corners: red, green and blue from 0 to 1.
-    faces : ndarray of int, shape (n,)
-        Number of the face that each is a part of: a line is drawn where two faces meet.
+    faces, surfaces : ndarray of int, shape (n,)
+        The face, and the smooth surface of several faces, that each is a part of: a fine line is drawn where two faces
+        meet, a dark one where two surfaces do.
     closed : bool
         Whether they bound solids, counterclockwise seen from outside: then none is ever seen from behind.
     places : ndarray, shape (k, 3, 4)
@@ -58,6 +60,7 @@ class Facets:
     normals: Floats
     colours: Floats
     faces: Integers
+    surfaces: Integers
     closed: bool
     places: Floats = field(default_factory=lambda: np.eye(3, 4)[np.newaxis])
 
@@ -93,7 +96,7 @@ def facets_of_wall(wall: Wall) -> Facets:
     parts = []
     for side in SIDES:
         placed = points[wall.patch_net, side] + shifts[:, np.newaxis, np.newaxis]
-        parts.append(_facets_of_grids(placed, normals[wall.patch_net, side], COLOURS[side], backwards=side == 0))
+        parts.append(_facets_of_grids(placed, normals[wall.patch_net, side], side, backwards=side == 0))
     return _joined([*parts, *_side_walls(wall, samples)])
 
 
@@ -111,11 +114,11 @@ def _side_walls(wall: Wall, samples: Floats) -> list[Facets]:
         made.append((both[0, 0], np.cross(both[1, 0], both[0, 1])))
     points, normals = (np.stack(part)[which.ravel()] for part in zip(*made, strict=True))
     placed = points + wall.shifts[wall.patch_shift[patches]][:, np.newaxis, np.newaxis]
-    return [_facets_of_grids(placed, normals, COLOURS[REST])]
+    return [_facets_of_grids(placed, normals, REST)]
 
 
-def _facets_of_grids(points: Floats, normals: Floats, colour: Colour, backwards: bool = False) -> Facets:
-    """Triangles of grids, shape (grids, a, b, 3), each a face; turned round if they face inwards."""
+def _facets_of_grids(points: Floats, normals: Floats, kind: int, backwards: bool = False) -> Facets:
+    """Triangles of grids, shape (grids, a, b, 3), each a face of one surface; turned round if they face inwards."""
     corners = []
     for grid in (points, normals):
         a, b, c, d = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
@@ -124,8 +127,14 @@ def _facets_of_grids(points: Floats, normals: Floats, colour: Colour, backwards:
     if backwards:
         corners = [corners[0][:, ::-1], -corners[1][:, ::-1]]
     count = len(corners[0])
-    faces = np.repeat(np.arange(len(points)), count // max(len(points), 1))
-    return Facets(corners[0], corners[1], np.broadcast_to(colour, (count, 3, 3)), faces, closed=True)
+    return Facets(
+        corners=corners[0],
+        normals=corners[1],
+        colours=np.broadcast_to(COLOURS[kind], (count, 3, 3)),
+        faces=np.repeat(np.arange(len(points)), count // max(len(points), 1)),
+        surfaces=np.full(count, kind),
+        closed=True,
+    )
 
 
 def facets_of_triangles(
@@ -150,13 +159,15 @@ def facets_of_triangles(
     """
     numbers = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
     corners = np.asarray(vertices, dtype=float)[numbers]
+    normals, surfaces = _smoothed(corners, numbers)
     each = np.broadcast_to(np.asarray(colours, dtype=float), (len(numbers), 3))
     return Facets(
-        corners,
-        _corner_normals(corners, numbers),
-        np.repeat(each[:, np.newaxis], 3, axis=1),
-        np.zeros(len(numbers), dtype=np.int64) if faces is None else faces,
-        closed,
+        corners=corners,
+        normals=normals,
+        colours=np.repeat(each[:, np.newaxis], 3, axis=1),
+        faces=np.zeros(len(numbers), dtype=np.int64) if faces is None else faces,
+        surfaces=surfaces,
+        closed=closed,
     )
 
 
@@ -198,38 +209,37 @@ def facets_of_shape(
 
 
 def _joined(parts: Sequence[Facets]) -> Facets:
-    """Facets that stand in the same places, together; each part's faces apart from those of the others."""
+    """Facets of a wall together; each part's faces apart from those of the others."""
     firsts = np.cumsum([0, *(int(part.faces.max(initial=-1)) + 1 for part in parts)])
     return Facets(
         corners=np.concatenate([part.corners for part in parts]),
         normals=np.concatenate([part.normals for part in parts]),
         colours=np.concatenate([part.colours for part in parts]),
         faces=np.concatenate([part.faces + first for part, first in zip(parts, firsts[:-1], strict=True)]),
+        surfaces=np.concatenate([part.surfaces for part in parts]),
         closed=all(part.closed for part in parts),
     )
 
 
-def _corner_normals(corners: Floats, triangles: Integers) -> Floats:
-    """Mean normal at each corner of the triangles round it, as far as no sharp edge parts them; (m, 3, 3)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+def _smoothed(corners: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+    """Normals at corners, shape (m, 3, 3), and the smooth surface of each triangle: both end at sharp edges.
 
+    The normal of a corner is the mean of the triangles round it, as far as no sharp edge parts them.
+    """
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     unit = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
-    count = triangles.size
     # A side runs from each corner to the next; those of one edge follow each other once they are sorted.
-    start, end = np.arange(count), np.arange(count).reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    start, end = np.arange(triangles.size), np.arange(triangles.size).reshape(-1, 3)[:, [1, 2, 0]].ravel()
     numbers = triangles.ravel()
     swapped = numbers[start] > numbers[end]
     low, high = np.where(swapped, end, start), np.where(swapped, start, end)
     order = np.lexsort((numbers[high], numbers[low]))
     one, other = order[:-1], order[1:]
     shared = (numbers[low[one]] == numbers[low[other]]) & (numbers[high[one]] == numbers[high[other]])
-    one, other = one[shared], other[shared]
-    smooth = np.einsum("nk,nk->n", unit[one // 3], unit[other // 3]) > _SHARP
+    smooth = shared & (dot(unit[one // 3], unit[other // 3]) > _SHARP)
     one, other = one[smooth], other[smooth]
-    links = (np.concatenate([low[one], high[one]]), np.concatenate([low[other], high[other]]))
-    graph = coo_array((np.ones(len(links[0]), dtype=bool), links), shape=(count, count))
-    _, group = connected_components(graph, directed=False)
-    summed = [np.bincount(group, np.repeat(flat[:, axis], 3))[group] for axis in range(3)]
-    return np.asarray(np.stack(summed, axis=1).reshape(-1, 3, 3), dtype=float)
+    ends = np.concatenate([low[one], high[one]]), np.concatenate([low[other], high[other]])
+    group = connected(triangles.size, *ends)
+    summed = [np.bincount(group, np.repeat(flat[:, axis], 3), minlength=1)[group] for axis in range(3)]
+    normals = np.stack(summed, axis=1).reshape(-1, 3, 3).astype(float)
+    return normals, connected(len(triangles), one // 3, other // 3)

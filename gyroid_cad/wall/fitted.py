@@ -179,6 +179,7 @@ def fit_spec(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
         spec.cells,
         _BYTES_PER_ALIKE_CELL if alike else _BYTES_PER_CELL,
         10 if alike else spec.settings.control_points,
+        kernel=False,
     )
     seconds: dict[str, float] = {}
     with timed(seconds, "complex", progress):
@@ -189,7 +190,7 @@ def fit_spec(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
         spec.settings,
         spec.tolerance,
         lambda stage: timed(seconds, stage, progress),
-        lambda control_points: require_memory(spec.cells, _BYTES_PER_CELL, control_points),
+        lambda control_points: require_memory(spec.cells, _BYTES_PER_CELL, control_points, kernel=False),
     )
     return FittedWall(spec, complex, wall, refit, seconds)
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,12 +12,17 @@ import cadquery as cq
 import pytest
 
 from gyroid_cad.cli.app import main
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import read_triangles
 from gyroid_cad.mesh.triangles.measures import triangle_measures
+from gyroid_cad.printing.print_check import print_check
+from gyroid_cad.surface.fit import FitSettings
 
 Captured = pytest.CaptureFixture[str]
 
@@ -205,3 +212,111 @@ def test_a_file_that_is_no_step_file_is_one_line_and_nothing_else(
     assert len(err.splitlines()) == 1
     assert "part.step" in err
     assert not (tmp_path / "a.step").exists()
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    write_step(cq.Workplane().box(3, 3, 3).val().wrapped, tmp_path / "small.step")
+    return tmp_path / "small.step"
+
+
+def test_a_file_holds_a_whole_fill_and_what_is_given_overrides_it(capsys: Captured, small: Path) -> None:
+    folder = small.parent
+    (folder / "fill.toml").write_text(
+        'part = "small.step"\noutput = ["light.brep", "light.stl"]\ncell_size = 10\ncontrol_points = 5\n'
+        'thickness = "1 + 0.02*z"\ntolerance = 1e-2\norigin = [1, 2, 3]\ndeviation = 0.2\n'
+    )
+    done = run(capsys, folder / "fill.toml", "--json")
+    assert done.status == 0, done.err
+    summary = json.loads(done.out)
+    assert [Path(file["path"]).name for file in summary["files"]] == ["light.brep", "light.stl"]
+    expected = fill(small, 10, "1 + 0.02*z", origin=(1, 2, 3), tolerance=1e-2, fit=FitSettings(5)).report
+    assert summary["volume"] == expected.volume
+    write_step(cq.Workplane().box(2, 3, 3).val().wrapped, folder / "other.step")
+    other = run(capsys, folder / "other.step", folder / "fill.toml", "-o", folder / "b.brep", "--json")
+    assert json.loads(other.out)["part_volume"] == pytest.approx(18)
+    assert [Path(file["path"]).name for file in json.loads(other.out)["files"]] == ["b.brep"]
+
+
+def test_the_printed_fill_prints_itself_again_and_fills_nothing(capsys: Captured, block: Path) -> None:
+    options = ["--density", "0.3", "--skin", "0.5", "--opening", ">Z", "--opening", "0,0,-3.5", "--printer", "form2"]
+    first = run(capsys, block.name, "-o", "a.step", *FILL, *options, "--print-config")
+    assert first.status == 0, first.err
+    printed = tomllib.loads(first.out)
+    assert (printed["part"], printed["opening"]) == (block.name, [">Z", "0,0,-3.5"])
+    (block.parent / "fill.toml").write_text(first.out)
+    again = run(capsys, block.parent / "fill.toml", "--print-config")
+    assert {**tomllib.loads(again.out), "part": block.name, "output": ["a.step"]} == printed
+    assert not (block.parent / "a.step").exists()
+
+
+def test_a_block_of_cells_that_a_map_carries_fills_a_part(capsys: Captured, tmp_path: Path) -> None:
+    part = tmp_path / "part.step"
+    write_step(cq.Workplane().box(3, 3, 3).translate((5, 5, 5)).val().wrapped, part)
+    words = {"scale-field": "1 + 0.01*x", "map": "twist:angle=10", "tolerance": "1e-2"}
+    options = [word for name, value in words.items() for word in (f"--{name}", value)]
+    done = run(
+        *(capsys, part, "-o", tmp_path / "a.brep", "--cells", 1, 1, 1, *FILL, "--density", 0.3, *options, "--json")
+    )
+    assert done.status == 0, done.err
+    lattice = Lattice((1, 1, 1), 10, density=0.3, scale_field="1 + 0.01*x", map="twist:angle=10", tolerance=1e-2)
+    expected = fill(part, lattice=replace(lattice, fit=FitSettings(6))).report
+    assert json.loads(done.out)["volume"] == expected.volume
+    assert expected.volume != pytest.approx(fill(part, 10, density=0.3, fit=FitSettings(6)).report.volume, rel=1e-3)
+
+
+def test_a_printer_checks_what_is_left_of_the_part(capsys: Captured, small: Path) -> None:
+    options = ["--thickness", "0.3", "--deviation", "0.1", "--printer", "form2"]
+    done = run(capsys, small, "-o", small.with_name("a.brep"), *FILL, *options, "--json")
+    assert done.status == 0, done.err
+    check = json.loads(done.out)["print_check"]
+    assert check["size"] == pytest.approx([3, 3, 3], abs=1e-3)
+    assert (check["min_wall"], check["wall"], check["printer"]["key"]) == (0.3, "too thin", "form2")
+    shown = run(capsys, small, "-o", small.with_name("a.brep"), *FILL, *options)
+    assert "smallest wall" in shown.out
+    assert "build volume" in shown.out
+
+
+def test_a_network_that_is_checked_for_a_printer_has_its_walls_measured(small: Path) -> None:
+    network = fill(small, 10, density=0.6, kind="network-a", fit=FitSettings(5))
+    check = print_check(network, "form2", deviation=0.1)
+    assert network.report.min_wall is None
+    assert check.walls_measured > 0
+    with pytest.raises(ParameterError, match=r"kind = 'surface': expected one that is a solid"):
+        print_check(fill(small, 10, kind="surface", fit=FitSettings(5)))
+    with pytest.raises(ParameterError, match="deviation = -1"):
+        print_check(network, "form2", deviation=-1)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "Missing argument 'PART.step'"),
+        (["a.step", "b.step"], "expected one part"),
+        (["a.step", "a.toml", "b.toml"], "at most one TOML file"),
+        (["a.step"], "Missing option '-o'"),
+        (["a.step", "-o", "b.step", "--density", "0.3"], "Missing option '--cell-size'"),
+        (["a.step", "-o", "b.step", *FILL, "--density", "0.3", "--map", "twist:angle=9"], "give --cells with --map"),
+        (["a.step", "-o", "b.step", *FILL, "--density", "0.3", "--scale", "2"], "give --cells with --scale"),
+        (["a.step", "-o", "b.step", *FILL, "--density", "0.3", "--printer", "none"], "--printer = 'none'"),
+        (["a.step", "-o", "b.step", *FILL, "--density", "0.3", "--kind", "sheet", "--trim", "box"], "--trim"),
+    ],
+)
+def test_what_a_fill_lacks_is_said_before_anything_is_read(
+    capsys: Captured, options: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.toml", "b.toml"):
+        (tmp_path / name).write_text("cell_size = 10\n")
+    failed = run(capsys, *options)
+    assert failed.status == 2
+    assert len(failed.err.splitlines()) == 1
+    assert words in failed.err
+
+
+def test_a_part_that_a_file_names_wrongly_is_told_by_the_files_line(capsys: Captured, tmp_path: Path) -> None:
+    (tmp_path / "fill.toml").write_text('cell_size = 10\ndensity = 0.3\npart = "part.iges"\noutput = "a.step"\n')
+    failed = run(capsys, tmp_path / "fill.toml")
+    assert failed.status != 0
+    assert len(failed.err.splitlines()) == 1
+    assert "part.iges" in failed.err

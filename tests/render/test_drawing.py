@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BytesIO
 
 import build123d as bd
@@ -44,7 +45,7 @@ def ball(subdivisions: int = 5) -> Facets:
 
 
 def seen_from_both_sides(facets: Facets) -> Facets:
-    return Facets(facets.corners, facets.normals, facets.colours, facets.faces, closed=False)
+    return replace(facets, closed=False)
 
 
 def brightness(image: Bytes) -> NDArray[np.int64]:

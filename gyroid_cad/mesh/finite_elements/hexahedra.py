@@ -13,6 +13,7 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.data import MeshData
@@ -163,19 +164,13 @@ def _meshed(wall: Wall, subdivisions: int, layers: int, element: ElementType) ->
 
 def _require_room(patches: int, subdivisions: int, layers: int, element: ElementType) -> None:
     """Refuse a mesh that does not fit in memory."""
-    import psutil
-
     elements = patches * subdivisions**2 * max(layers, 1)
-    needed = _BYTES_BEFORE + elements * _BYTES_PER_ELEMENT_NODE * len(element.nodes)
-    available = psutil.virtual_memory().available
-    if needed > available:
-        most = max(1, int(subdivisions * max(0.0, (available - _BYTES_BEFORE) / (needed - _BYTES_BEFORE)) ** 0.5))
-        raise ParameterError(
-            "subdivisions",
-            subdivisions,
-            f"at most about {most} with {max(layers, 1)} layers: these are {elements:,} elements, which take about "
-            f"{needed / 1e9:.3g} GB of memory, and {available / 1e9:.3g} GB are free",
-        )
+    needed = elements * _BYTES_PER_ELEMENT_NODE * len(element.nodes)
+
+    def accepted(left: int) -> str:
+        return f"at most about {max(1, int(subdivisions * (left / needed) ** 0.5))} with {max(layers, 1)} layers"
+
+    require_room("subdivisions", subdivisions, needed, accepted, False, _BYTES_BEFORE, f"these {elements:,} elements")
 
 
 def _nodes(wall: Wall, steps: int, levels: Floats) -> Floats:

@@ -1,0 +1,78 @@
+"""Shapes of the kernel as those of its hosts: CadQuery's and build123d's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import build123d as bd
+    import cadquery as cq
+
+    from gyroid_cad.kernel.solid import KernelShape
+
+__all__ = ["HostShapes"]
+
+
+class HasSolid(Protocol):
+    def solid(self) -> KernelShape: ...
+
+
+class HostShapes:
+    """Mixin for whatever has a ``solid``: the kernel's shape as the hosts' own types, which they ask for.
+
+    The hosts are optional, and take seconds to load: they are imported when they are asked for.
+    """
+
+    __slots__ = ()
+
+    def to_cadquery(self: HasSolid) -> cq.Shape:
+        """Return the solid as a CadQuery shape, for ``cq.Assembly``, ``cq.Workplane``, exporters and viewers.
+
+        Returns
+        -------
+        cadquery.Shape
+            A Solid, or a Compound of several; a shape of the caller's own, as of ``solid``.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            Without CadQuery: ``pip install "gyroid_cad[cadquery]"``.
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> from gyroid_cad import Lattice
+        >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
+        >>> assembly = cq.Assembly().add(lattice.to_cadquery(), name="lattice")
+        >>> cq.Workplane(obj=lattice.to_cadquery()).faces().size()
+        84
+        """
+        from cadquery import Shape
+
+        return Shape.cast(self.solid())
+
+    def to_build123d(self: HasSolid) -> bd.Part:
+        """Return the solid as a build123d part, for algebra, builders, exporters and viewers.
+
+        Returns
+        -------
+        build123d.Part
+            Of one solid or several; a shape of the caller's own, as of ``solid``.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            Without build123d: ``pip install "gyroid_cad[build123d]"``.
+
+        Examples
+        --------
+        >>> import build123d as bd
+        >>> from gyroid_cad import Lattice
+        >>> part = Lattice((1, 1, 1), 10, thickness=0.8).to_build123d()
+        >>> len((part + bd.Pos(0, 0, 40) * bd.Box(10, 10, 10)).solids())
+        2
+        """
+        from build123d import Compound, Part, Shape
+
+        shape = Shape.cast(self.solid())
+        return Part(shape.wrapped if isinstance(shape, Compound) else [shape])

@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
+from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -171,6 +172,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 done, 1 failed, 2 bad usage; an error is one line on stderr.
     """
     session = Session()
+    if isinstance(sys.stdout, TextIOWrapper):
+        # A file's name may hold what the terminal has no letters for.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         if (answered := answered_shell(commands, PROGRAM)) is not None:
             return answered

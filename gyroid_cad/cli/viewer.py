@@ -22,6 +22,7 @@ from gyroid_cad.common.formats import (
     require_format,
     require_output,
 )
+from gyroid_cad.common.inputs import unreadable
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.lattice import Lattice
@@ -104,8 +105,8 @@ def has_display() -> bool:
 
 def _require_viewed(path: str | os.PathLike[str]) -> None:
     require_format("file", path, PART_FORMATS, "a file ending in ")
-    if not Path(path).is_file():
-        raise ParameterError("file", str(path), "a file that exists")
+    if reason := unreadable(path):
+        raise ParameterError("file", str(path), f"a file that exists and can be read: {reason}")
 
 
 def _require_display() -> None:

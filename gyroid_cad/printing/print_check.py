@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.formats import require_meshing
 from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import text_table
@@ -234,6 +235,8 @@ def print_check(
     ParameterError
     """
     chosen = printer if isinstance(printer, Printer) else printer_named(printer)
+    if deviation is not None:
+        require_meshing(deviation)
     if isinstance(part, Lattice):
         return _check_lattice(part, chosen, deviation, progress)
     vertices: NDArray[np.floating]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, Format, require_format
+from gyroid_cad.common.inputs import unreadable
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
@@ -53,8 +54,8 @@ def read_contents(path: str) -> FileContents:
         If it cannot be read.
     """
     target, form = Path(path), require_format("input file", path, PART_FORMATS)
-    if not target.is_file():
-        raise ParameterError("input file", path, "a file that exists")
+    if reason := unreadable(path):
+        raise ParameterError("input file", path, f"a file that exists and can be read: {reason}")
     return _triangles_of(target, form) if form in TRIANGLE_FORMATS else _shape_of(target, form)
 
 

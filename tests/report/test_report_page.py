@@ -225,7 +225,7 @@ def test_a_file_s_pieces_are_one_number_on_the_whole_page(
         ([*CELL, "-o", "nowhere/a.html"], "existing folder"),
         ([*CELL, "-o", "a.html", "-o", "b.html"], "one file"),
         ([*CELL, "-o", "a.html", "--subdivisions", "0"], "--subdivisions = 0"),
-        ([*CELL, "-o", "a.html", "--density", "0.3"], "exactly one of --thickness and --density"),
+        ([*CELL, "-o", "a.html", "--density", "0.3"], "exactly one of --thickness, --density"),
         (["-o", "a.html", "--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "9"], "curvature limit"),
         (["part.obj", "-o", "a.html"], "input file = 'part.obj': expected a lattice in a .toml file, or"),
         (["missing.step", "-o", "a.html"], "a file that exists"),

@@ -21,11 +21,11 @@ from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
     Frame,
     covering_complex,
-    nearest_offsets,
     patch_sides,
     periodic_offsets,
     wall_extremes,
 )
+from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading

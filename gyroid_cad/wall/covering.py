@@ -18,6 +18,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
+from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 
@@ -31,7 +32,6 @@ __all__ = [
     "Frame",
     "covering_complex",
     "first_success",
-    "nearest_offsets",
     "patch_sides",
     "periodic_offsets",
     "wall_extremes",
@@ -209,25 +209,3 @@ def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: Mi
     places, normals = patch_points_and_normals(cell, cell_size, np.linspace(-1, 1, _OFFSET_SAMPLES))
     own = np.mod(frame.own(points), cell_size)
     return nearest_offsets(places, normals, own)[0]
-
-
-def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
-    """Distance of points from samples of a surface, along its normal.
-
-    Parameters
-    ----------
-    places, normals : ndarray, shape (..., 3)
-        Of the surface.
-    points : ndarray, shape (n, 3)
-
-    Returns
-    -------
-    offsets : ndarray, shape (n,)
-    nearest : ndarray of int, shape (n,)
-        Flat indices of the samples.
-    """
-    from scipy.spatial import cKDTree
-
-    places, normals = places.reshape(-1, 3), normals.reshape(-1, 3)
-    nearest = np.asarray(cKDTree(places).query(points)[1], dtype=np.int64)
-    return np.asarray(np.sum((points - places[nearest]) * normals[nearest], axis=1)), nearest

@@ -1,1 +1,1 @@
-"""The only folder that imports the CAD kernel (OpenCascade, through OCP)."""
+"""The CAD kernel (OpenCascade, through OCP): surfaces, solids, checks, booleans, reading and writing."""

@@ -1,1 +1,1 @@
-"""The wall: cell complex, grading, offset control nets, and whether they meet themselves."""
+"""The wall: cell complex, grading, offset control nets, their areas and their self-intersection."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.subject import CELL_SIZE, THICKNESS, block, block_solid, kernel_volume
 from benchmarks.timing import Row, arguments_for, plain_table, print_verdicts
-from gyroid_cad.nurbs.surface import gauss_points
+from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, FittedPatch, fit_patch
 from gyroid_cad.surface.fit_report import FitReport, fit_report

@@ -22,11 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.timing import Row, arguments_for, best_in_turn, plain_table, print_verdicts
-from gyroid_cad import Cylinder, Lattice
+from gyroid_cad import Lattice
 from gyroid_cad.builds.solid import Build
 from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.kernel.step import write_step
-from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.maps import Cylinder
+from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex

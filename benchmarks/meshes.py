@@ -22,9 +22,8 @@ from benchmarks.timing import Row, arguments_for, best_in_turn, best_of, fresh_p
 from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.common.formats import MESH_FORMATS
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.mesh.finite_elements.files import write_mesh
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra, quadrilaterals
-from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.nurbs.basis import basis
 
 __all__ = ["main"]
 
@@ -63,7 +62,7 @@ def _print_writing(mesh: Mesh) -> None:
     with TemporaryDirectory() as folder:
         for ending in [ending for form in MESH_FORMATS for ending in form.endings]:
             path = Path(folder) / f"mesh{ending}"
-            seconds, _ = best_of(lambda path=path: write_mesh(mesh, path), 1)  # type: ignore[misc]
+            seconds, _ = best_of(lambda path=path: mesh.write(path), 1)  # type: ignore[misc]
             lines.append((ending, f"{seconds:.2f} s", f"{path.stat().st_size / 1e6:.1f} MB"))
     plain_table(f"{len(mesh.cells):,} hexahedra to files", ("", "processor time", "size"), lines)
 

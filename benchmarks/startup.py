@@ -27,7 +27,8 @@ _FIRST_FIT = """
 import gyroid_cad
 from time import perf_counter
 start = perf_counter()
-gyroid_cad.fit_patch()
+from gyroid_cad.surface.fit import fit_patch
+fit_patch()
 print(perf_counter() - start)
 """
 _BUILD = ("-m", "gyroid_cad", "build", "--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "0.8", "--quiet")

@@ -1,6 +1,7 @@
 """Bone, as in the paper's Fig. 1: spongy about the middle, dense towards the outside, without a step between."""
 
-from gyroid_cad import Lattice, distance_from_axis
+from gyroid_cad import Lattice
+from gyroid_cad.fields import distance_from_axis
 
 from_axis = distance_from_axis((15, 15, 0), (0, 0, 1))
 density = 0.12 + 0.68 / (1 + 2 ** (12 - from_axis))

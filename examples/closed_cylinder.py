@@ -1,6 +1,7 @@
 """Twelve cells round a cylinder, the last joined to the first: no seam is left in the solid."""
 
-from gyroid_cad import Cylinder, Lattice
+from gyroid_cad import Lattice
+from gyroid_cad.maps import Cylinder
 
 lattice = Lattice(cells=(12, 2, 1), cell_size=10, thickness=0.8, map=Cylinder(radius=20, angle=360))
 lattice.write("closed_cylinder.step")

@@ -5,16 +5,15 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import spsolve
 
-from gyroid_cad import Lattice, write_volumes
-from gyroid_cad.mesh.iga.files import write_mfem_field
+from gyroid_cad import Lattice
 from gyroid_cad.mesh.iga.patches import periodic_points
 
 lattice = Lattice(cells=(1, 1, 1), cell_size=10, density=0.3)
 wall = lattice.wall()
 volumes = lattice.volumes(degree=3)
 mesh_file, numbers_file = "isogeometric_heat.mesh", "control_point_numbers.gf"
-write_volumes(volumes, mesh_file)
-write_volumes(volumes, "isogeometric_heat.npz")
+volumes.write(mesh_file)
+volumes.write("isogeometric_heat.npz")
 
 # MFEM's conductivity matrix, for a material that conducts 1 W/(m K).
 mesh = mfem.Mesh(mesh_file)
@@ -27,7 +26,7 @@ matrix = form.SpMat()
 conduction = csr_array((matrix.GetDataArray(), matrix.GetJArray(), matrix.GetIArray()))
 
 # Ours for each of MFEM's numbers of control points, and theirs where opposite ends of the cell are one.
-write_mfem_field(volumes, np.arange(len(volumes.control_points)), numbers_file)
+volumes.write_field(np.arange(len(volumes.control_points)), numbers_file)
 ours = mfem.GridFunction(mesh, numbers_file).GetDataArray().astype(int)
 endless = periodic_points(wall, volumes)[ours]
 join = csr_array((np.ones(len(ours)), (np.arange(len(ours)), endless)))

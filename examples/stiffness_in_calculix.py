@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from gyroid_cad import Lattice, write_mesh, write_periodic_equations
+from gyroid_cad import Lattice
 
 CELL_SIZE, DENSITY = 10.0, 0.3
 YOUNG, POISSON = 1000.0, 0.3  # MPa
@@ -22,7 +22,8 @@ JOB = """*INCLUDE, INPUT=mesh.inp
 *ELASTIC
 {young}, {poisson}
 *SOLID SECTION, ELSET=WALL, MATERIAL=SOLID
-{equations}*BOUNDARY
+*INCLUDE, INPUT=equations.inp
+*BOUNDARY
 {held}, 1, 3
 *STEP
 *STATIC
@@ -44,16 +45,13 @@ def stiffness(subdivisions: int, job: Path) -> float:
     lattice = Lattice((1, 1, 1), CELL_SIZE, density=DENSITY)
     mesh = lattice.hexahedra(subdivisions, order=2)
     pairs = lattice.periodic_pairs(mesh)
-    write_mesh(mesh, job.with_name("mesh").with_suffix(".inp"), pairs)
+    mesh.write(job.with_name("mesh").with_suffix(".inp"), pairs=pairs)
     reference = len(mesh.points) + 1
-    with job.with_suffix(".inp").open("w") as file:
-        before, after = JOB.split("{equations}")
-        values = {"young": YOUNG, "poisson": POISSON, "stretch": STRAIN * CELL_SIZE}
-        # Any node that follows no other holds the cell in its place.
-        held = np.setdiff1d(np.arange(len(mesh.points)), pairs.second)[0] + 1
-        file.write(before.format(reference=reference, **values))
-        write_periodic_equations(pairs, file, reference)
-        file.write(after.format(reference=reference, held=held, **values))
+    pairs.write(job.with_name("equations").with_suffix(".inp"), reference=reference)
+    # Any node that follows no other holds the cell in its place.
+    held = np.setdiff1d(np.arange(len(mesh.points)), pairs.second)[0] + 1
+    values = {"young": YOUNG, "poisson": POISSON, "stretch": STRAIN * CELL_SIZE}
+    job.with_suffix(".inp").write_text(JOB.format(reference=reference, held=held, **values))
     subprocess.run(["ccx", job.name], cwd=job.parent, check=True, capture_output=True)
     energy = re.search(r"internal energy for set WALL.*\s+(\S+)", job.with_suffix(".dat").read_text())
     assert energy is not None

@@ -1,102 +1,90 @@
 """The gyroid as exact-grade B-rep solids.
 
 Names are loaded when first used, so that ``import gyroid_cad`` costs next to nothing and loads neither
-the CAD kernel nor CadQuery nor build123d.
+the CAD kernel nor CadQuery nor build123d. Maps of space are in :mod:`gyroid_cad.maps`, the makers of fields in
+:mod:`gyroid_cad.fields`: none of the names here is one of the hosts' too.
+
+>>> from gyroid_cad import Lattice
+>>> Lattice(cells=(2, 2, 2), cell_size=10, thickness=0.8).volume_fraction
+0.24517093...
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import sys
+from typing import TYPE_CHECKING, Any
 
+from gyroid_cad.former import METHODS, FormerModules, Moved, former_name
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
-    from gyroid_cad.builds.assembly import Assembly, AssemblyReport
     from gyroid_cad.builds.meshes import mesh_quality
-    from gyroid_cad.builds.triangles import TriangleReport
-    from gyroid_cad.errors import ExportError, FitError, GyroidError, KernelError, ParameterError, SelfIntersectionError
-    from gyroid_cad.fields.field import Field
-    from gyroid_cad.fields.makers import (
-        between_planes,
-        constant,
-        distance_from_axis,
-        distance_from_point,
-        expression,
-        linear,
-        radial,
-        sampled,
-        smooth_maximum,
-        smooth_minimum,
+    from gyroid_cad.errors import (
+        ExportError,
+        FitError,
+        GyroidError,
+        IslandsWarning,
+        KernelError,
+        ParameterError,
+        SelfIntersectionError,
     )
+    from gyroid_cad.fields.field import Field
     from gyroid_cad.filling.fill import Filled, FillReport, fill
     from gyroid_cad.lattice import Lattice, LatticeReport
-    from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
-    from gyroid_cad.maps.space import SpaceMap
-    from gyroid_cad.mesh.finite_elements.abaqus import write_periodic_equations
-    from gyroid_cad.mesh.finite_elements.files import write_mesh
     from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
-    from gyroid_cad.mesh.iga.files import write_volumes
     from gyroid_cad.mesh.iga.patches import VolumePatches
-    from gyroid_cad.nurbs.surface import NurbsSurface
     from gyroid_cad.printing.print_check import PrintCheck, print_check
     from gyroid_cad.printing.printers import Printer
-    from gyroid_cad.surface.fit import FitSettings, fit_patch
-    from gyroid_cad.surface.fit_report import FitReport, fit_report
+    from gyroid_cad.surface.fit import FitSettings
 
 __all__ = [
-    "Assembly",
-    "AssemblyReport",
-    "Bend",
-    "Cylinder",
     "ExportError",
     "Field",
     "FillReport",
     "Filled",
     "FitError",
-    "FitReport",
     "FitSettings",
     "GyroidError",
+    "IslandsWarning",
     "KernelError",
     "Lattice",
     "LatticeReport",
     "Mesh",
-    "NurbsSurface",
     "ParameterError",
     "PrintCheck",
     "Printer",
     "SelfIntersectionError",
-    "SpaceMap",
-    "Sphere",
-    "TriangleReport",
-    "Twist",
     "VolumePatches",
     "__version__",
-    "between_planes",
-    "constant",
-    "distance_from_axis",
-    "distance_from_point",
-    "expression",
     "fill",
-    "fit_patch",
-    "fit_report",
-    "linear",
     "mesh_quality",
     "print_check",
-    "radial",
-    "sampled",
-    "smooth_maximum",
-    "smooth_minimum",
-    "write_mesh",
-    "write_periodic_equations",
-    "write_volumes",
 ]
 
 _HOMES = {
-    "builds.assembly": ("Assembly", "AssemblyReport"),
-    "maps.block": ("Bend", "Cylinder", "Sphere", "Twist"),
-    "errors": ("ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"),
+    "builds.meshes": ("mesh_quality",),
+    "errors": (
+        "ExportError",
+        "FitError",
+        "GyroidError",
+        "IslandsWarning",
+        "KernelError",
+        "ParameterError",
+        "SelfIntersectionError",
+    ),
     "fields.field": ("Field",),
-    "fields.makers": (
+    "filling.fill": ("FillReport", "Filled", "fill"),
+    "lattice": ("Lattice", "LatticeReport"),
+    "mesh.finite_elements.hexahedra": ("Mesh",),
+    "mesh.iga.patches": ("VolumePatches",),
+    "printing.print_check": ("PrintCheck", "print_check"),
+    "printing.printers": ("Printer",),
+    "surface.fit": ("FitSettings",),
+}
+_MOVED = {
+    "builds.assembly": ("Assembly", "AssemblyReport"),
+    "builds.triangles": ("TriangleReport",),
+    "fields": (
         "between_planes",
         "constant",
         "distance_from_axis",
@@ -108,31 +96,27 @@ _HOMES = {
         "smooth_maximum",
         "smooth_minimum",
     ),
-    "filling.fill": ("FillReport", "Filled", "fill"),
-    "surface.fit": ("FitSettings", "fit_patch"),
-    "surface.fit_report": ("FitReport", "fit_report"),
-    "lattice": ("Lattice", "LatticeReport"),
-    "maps.space": ("SpaceMap",),
-    "mesh.finite_elements.abaqus": ("write_periodic_equations",),
-    "mesh.finite_elements.hexahedra": ("Mesh",),
-    "mesh.finite_elements.files": ("write_mesh",),
-    "mesh.iga.files": ("write_volumes",),
-    "mesh.iga.patches": ("VolumePatches",),
-    "builds.meshes": ("mesh_quality",),
+    "maps": ("Bend", "Cylinder", "SpaceMap", "Sphere", "Twist"),
     "nurbs.surface": ("NurbsSurface",),
-    "printing.print_check": ("PrintCheck", "print_check"),
-    "printing.printers": ("Printer",),
-    "builds.triangles": ("TriangleReport",),
+    "surface.fit": ("fit_patch",),
+    "surface.fit_report": ("FitReport", "fit_report"),
 }
+_PLACES = {
+    **{name: Moved(f"gyroid_cad.{module}.{name}") for module, names in _MOVED.items() for name in names},
+    **{name: Moved(f"gyroid_cad.former.{name}", method) for name, method in METHODS.items()},
+    "SoundnessError": Moved("gyroid_cad.errors.SelfIntersectionError", "gyroid_cad.SelfIntersectionError"),
+}
+if not any(isinstance(finder, FormerModules) for finder in sys.meta_path):
+    sys.meta_path.append(FormerModules())
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     for module, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"gyroid_cad.{module}"), name)
-    raise AttributeError(f"module 'gyroid_cad' has no attribute {name!r}")
+    return former_name(__name__, name, _PLACES.get(name))
 
 
 def __dir__() -> list[str]:

@@ -31,7 +31,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
@@ -62,9 +62,20 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         tolerance: float | None = None,
         trim: Trim | None = None,
         surface: SurfaceName = "gyroid",
+        keep_islands: bool = False,
     ) -> None:
         self.lattice = Lattice(
-            cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim, surface
+            cells,
+            cell_size,
+            thickness,
+            density,
+            fit or FitSettings(),
+            scale_field,
+            map,
+            tolerance,
+            trim,
+            surface,
+            keep_islands=keep_islands,
         )
         part = Part.cast(self.lattice.solid())
         if align is not None:
@@ -88,7 +99,8 @@ class GyroidFill(Part):  # type: ignore[misc]
     mode : Mode
         In a builder, the filled part takes the place of what is there.
     **settings
-        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, material_density, tolerance, lattice, surface.
+        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, material_density, tolerance, lattice, surface,
+        keep_islands.
 
     Attributes
     ----------

@@ -38,12 +38,13 @@ def gyroid(
     tolerance: float | None = None,
     trim: Trim | None = None,
     surface: SurfaceName = "gyroid",
+    keep_islands: bool = False,
 ) -> cq.Workplane:
     """A lattice of the gyroid, or of another surface, at each point of the stack.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -63,7 +64,17 @@ def gyroid(
     ParameterError, FitError, KernelError
     """
     lattice = Lattice(
-        cells, cell_size, thickness, density, fit or FitSettings(), scale_field, map, tolerance, trim, surface
+        cells,
+        cell_size,
+        thickness,
+        density,
+        fit or FitSettings(),
+        scale_field,
+        map,
+        tolerance,
+        trim,
+        surface,
+        keep_islands=keep_islands,
     )
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
@@ -94,7 +105,8 @@ def gyroid_fill(
     cell_size, thickness, density, kind, skin
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates.
     **settings
-        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, openings, tolerance, lattice, surface.
+        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, openings, tolerance, lattice, surface,
+        keep_islands.
 
     Returns
     -------

@@ -2,7 +2,25 @@
 
 from __future__ import annotations
 
-__all__ = ["ExportError", "FitError", "GyroidError", "KernelError", "ParameterError", "SelfIntersectionError"]
+from typing import Any
+
+from gyroid_cad.former import Moved, former_name
+
+__all__ = [
+    "ExportError",
+    "FitError",
+    "GyroidError",
+    "IslandsWarning",
+    "KernelError",
+    "ParameterError",
+    "SelfIntersectionError",
+]
+
+_MOVED = {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}
+
+
+def __getattr__(name: str) -> Any:
+    return former_name(__name__, name, _MOVED.get(name))
 
 
 class GyroidError(Exception):
@@ -102,6 +120,10 @@ class KernelError(GyroidError, RuntimeError):
 
 class ExportError(GyroidError, OSError):
     """A file that could not be written; nothing was left behind and nothing older was touched."""
+
+
+class IslandsWarning(UserWarning):
+    """A lattice that was cut falls into pieces: some were dropped, or are left beside the largest one."""
 
 
 def _shown(value: object) -> str:

@@ -73,6 +73,10 @@ class Lattice(LatticeParameters):
         Cut to the block of cells itself, with flat sides, instead of whole patches. Not where space varies.
     surface : {"gyroid", "diamond", "primitive"}
         Schwarz's diamond and primitive surfaces have walls of their own largest thickness and density.
+    keep_islands : bool
+        Of a trimmed lattice: keep every piece that the cut leaves unconnected. If not, small ones are dropped, which
+        have less than a hundredth of what one cell holds, and of the largest piece. The report counts what is left or
+        dropped, and an :class:`~gyroid_cad.IslandsWarning` says so.
 
     Raises
     ------
@@ -128,8 +132,10 @@ class Lattice(LatticeParameters):
         built.valid(progress)
         with built.timed("fit report"):
             # Of a graded wall that is cut there is no exact volume to compare with.
-            exact = self.exact_volume if self.uniform or not self.trim else None
-            measures = (self.wall_thickness, self.volume_fraction, exact)
+            known = self.uniform or not self.trim
+            exact = self.exact_volume - built.islands.dropped_volume if known else None
+            density = built.density if self.trim else self.volume_fraction
+            measures = (self.wall_thickness, density, exact)
         return report_of(built, *measures)
 
     def write(
@@ -175,7 +181,7 @@ class Lattice(LatticeParameters):
         if instances:
             require_assembly_formats(targets)
             require_settings((1, 1, 1), schema, deviation, angle)
-            self.assembly(progress).write(targets, schema, progress)
+            self.assembly(progress).write(*targets, schema=schema, progress=progress)
             return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
@@ -184,7 +190,7 @@ class Lattice(LatticeParameters):
             built = self.built(progress)
             built.write(solid, schema, self._deviation(deviation), angle, progress)
         if flat:
-            self.triangles(deviation, progress).write(flat, progress)
+            self.triangles(deviation, progress).write(*flat, progress=progress)
 
     def assembly(self, progress: Progress | None = None) -> Assembly:
         """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
@@ -263,7 +269,7 @@ class Lattice(LatticeParameters):
         Returns
         -------
         Mesh
-            For :func:`gyroid_cad.write_mesh` and :func:`gyroid_cad.mesh_quality`.
+            Which :meth:`gyroid_cad.Mesh.write` puts into files and :func:`gyroid_cad.mesh_quality` measures.
 
         Raises
         ------
@@ -287,7 +293,7 @@ class Lattice(LatticeParameters):
         Returns
         -------
         VolumePatches
-            For :func:`gyroid_cad.write_volumes`.
+            Which :meth:`gyroid_cad.VolumePatches.write` puts into files.
 
         Raises
         ------
@@ -347,8 +353,11 @@ class Lattice(LatticeParameters):
         return rows
 
     def built(self, progress: Progress | None = None) -> Build:
-        """The build behind the solid and its files."""
-        return build(self.spec(), progress)
+        """The build behind the solid and its files; warns of the islands that a cut leaves."""
+        made = build(self.spec(), progress)
+        if self.trim:
+            made.islands.warn()
+        return made
 
     def fitted(self, progress: Progress | None = None) -> FittedWall:
         """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""

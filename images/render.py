@@ -16,7 +16,10 @@ import vtk
 from numpy.typing import NDArray
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
-from gyroid_cad import Cylinder, Lattice, NurbsSurface, distance_from_axis
+from gyroid_cad import Lattice
+from gyroid_cad.fields import distance_from_axis
+from gyroid_cad.maps import Cylinder
+from gyroid_cad.nurbs.surface import NurbsSurface
 from gyroid_cad.wall.offset import SIDES, Wall
 
 FOLDER = Path(__file__).parent

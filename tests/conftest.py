@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.nurbs.surface import basis, uniform_knots
+from gyroid_cad.nurbs.basis import basis, uniform_knots
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 

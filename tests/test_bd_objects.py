@@ -233,3 +233,11 @@ def test_nothing_to_fill_is_refused() -> None:
         GyroidFill(**FILL)
     with pytest.raises(ParameterError, match="part = None"):
         GyroidFill(**FILL)
+
+
+@pytest.mark.parametrize(("keep", "solids"), [(False, 1), (True, 3)])
+def test_chips_at_the_corners_of_whole_cells_are_dropped_unless_they_are_to_be_kept(keep: bool, solids: int) -> None:
+    box = bd.Box(10, 10, 10, align=bd.Align.MIN)
+    filled = GyroidFill(box, 10, 0.8, fit=GYROID["fit"], keep_islands=keep)
+    assert len(Gyroid(**GYROID, trim="box", keep_islands=keep).solids()) == len(filled.solids()) == solids
+    assert filled.report.islands + filled.report.dropped == 2

@@ -239,3 +239,10 @@ def test_a_lattice_cut_to_its_box_has_the_size_of_its_cells() -> None:
     block = cq.Workplane().gyroid((2, 1, 1), 10.0, density=0.3, fit=FitSettings(6), trim="box")
     corners = np.array([vertex.toTuple() for vertex in block.vertices().vals()])
     np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], [[-10, -5, -5], [10, 5, 5]], atol=1e-9)
+
+
+@pytest.mark.parametrize(("keep", "solids"), [(False, 1), (True, 3)])
+def test_chips_at_the_corners_of_whole_cells_are_dropped_unless_they_are_to_be_kept(keep: bool, solids: int) -> None:
+    made = cq.Workplane().gyroid(**GYROID, trim="box", keep_islands=keep)
+    filled = cq.Workplane().box(10, 10, 10, centered=False).gyroid_fill(10, 0.8, fit=GYROID["fit"], keep_islands=keep)
+    assert len(made.solids().vals()) == len(filled.solids().vals()) == solids

@@ -12,13 +12,14 @@ import trimesh
 from build123d import BuildPart
 
 import gyroid_cad.cq_plugin  # noqa: F401 (adds Workplane.gyroid)
-from gyroid_cad import Cylinder, FitSettings, Lattice, fill, write_volumes
+from gyroid_cad import FitSettings, Lattice, fill
 from gyroid_cad.bd_objects import Gyroid
 from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.cli.app import main
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.step import read_step
+from gyroid_cad.maps import Cylinder
 from gyroid_cad.mesh.nodes import FREE_WALLS
 from gyroid_cad.surface.families import SURFACES
 
@@ -126,7 +127,7 @@ def test_hexahedra_are_upright_and_their_free_walls_pair_up(name: str) -> None:
 def test_trivariate_patches_are_read_by_mfem_with_the_wall_s_volume(name: str, tmp_path: Path) -> None:
     mfem = pytest.importorskip("mfem.ser")
     lattice = Lattice((1, 1, 1), SIZE, density=0.3, surface=name, fit=FitSettings(6))
-    write_volumes(lattice.volumes(), tmp_path / "a.mesh")
+    lattice.volumes().write(tmp_path / "a.mesh")
     mesh = mfem.Mesh(str(tmp_path / "a.mesh"))
     space = mfem.FiniteElementSpace(mesh, mesh.GetNodes().OwnFEC())
     assert space.GetNDofs() == len(lattice.volumes().control_points)

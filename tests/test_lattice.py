@@ -20,10 +20,12 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 from gyroid_cad import Lattice
-from gyroid_cad.errors import FitError, GyroidError, ParameterError
+from gyroid_cad.errors import FitError, GyroidError, IslandsWarning, ParameterError
 from gyroid_cad.kernel.check import enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import read_step
+from gyroid_cad.mesh.triangles.files import read_triangles
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 
@@ -339,11 +341,47 @@ def test_a_name_with_a_null_character_and_no_name_at_all_are_refused() -> None:
 
 
 def test_a_lattice_cut_to_its_block_has_exactly_the_block_s_share() -> None:
-    made = Lattice((2, 1, 1), 10, density=0.3, trim="box").report()
+    made = Lattice((2, 1, 1), 10, density=0.3, trim="box", keep_islands=True).report()
     assert made.valid
     assert made.closed
     assert made.volume == pytest.approx(0.3 * 2000, rel=1e-6)
+    assert made.density == pytest.approx(0.3, rel=1e-6)
     assert made.boundary_edges == made.non_manifold_edges == 0
+
+
+# Beyond these densities the chips at the corners have grown together with the rest, or there are none.
+@pytest.mark.parametrize(
+    ("surface", "density"), [("gyroid", 0.1), ("gyroid", 0.7), ("diamond", 0.3), ("diamond", 0.7), ("primitive", 0.3)]
+)
+def test_a_lattice_cut_to_its_block_is_one_solid_without_the_chips_at_two_corners(surface: str, density: float) -> None:
+    given = {"cells": (1, 1, 1), "cell_size": 8, "density": density, "surface": surface, "fit": FitSettings(6)}
+    with pytest.warns(IslandsWarning, match=r"2 islands, .* dropped \(keep_islands keeps\)"):
+        made = Lattice(**given, trim="box").report()
+    with pytest.warns(IslandsWarning, match=r"2 islands, .* left"):
+        whole = Lattice(**given, trim="box", keep_islands=True).report()
+    assert (made.solids, made.islands, made.dropped) == (1, 0, 2)
+    assert (whole.solids, whole.islands, whole.dropped) == (3, 2, 0)
+    assert made.volume + made.dropped_volume == pytest.approx(whole.volume, rel=1e-12)
+    assert made.dropped_volume == pytest.approx(whole.islands_volume)
+    # What the fit is off by does not change with what is dropped.
+    assert made.volume - made.volume_exact == pytest.approx(whole.volume - whole.volume_exact, abs=1e-9)
+    assert made.density == made.volume / 8**3
+    assert made.faces < whole.faces
+
+
+@pytest.mark.parametrize("ending", ["step", "stl", "3mf"])
+def test_the_files_of_a_lattice_cut_to_its_block_hold_one_piece(tmp_path: Path, ending: str) -> None:
+    lattice, path = Lattice((1, 1, 1), 8, density=0.2, trim="box", fit=FitSettings(6)), tmp_path / f"a.{ending}"
+    lattice.write(path, deviation=0.1)
+    if ending == "step":
+        assert topology(read_step(path)).solids == 1
+    else:
+        assert triangle_measures(*read_triangles(path)).pieces == 1
+
+
+def test_islands_are_of_trimmed_lattices_only() -> None:
+    with pytest.raises(ParameterError, match="keep_islands = True: expected a lattice that is trimmed"):
+        Lattice(**GOOD, keep_islands=True)
 
 
 def test_a_cut_lattice_fills_its_block_exactly() -> None:

@@ -10,7 +10,7 @@ from drawing import Floats, plot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gyroid_cad.nurbs.surface import basis, gauss_points
+from gyroid_cad.nurbs.basis import basis, gauss_points
 from gyroid_cad.surface.fit import DEGREE, FitSettings
 from gyroid_cad.surface.weierstrass import CORNER
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import prod
@@ -12,7 +13,7 @@ import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import STEP, require_format
+from gyroid_cad.common.formats import STEP, require_format, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
@@ -79,8 +80,16 @@ class Assembly:
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
         return NamedPart(solid, PART_NAME, GREEN, faces)
 
-    def write(self, targets: Sequence[Path], schema: Schema = "ap214", progress: Progress | None = None) -> None:
-        """Write STEP assemblies.
+    def write(self, *paths: str | os.PathLike[str], schema: Schema = "ap214", progress: Progress | None = None) -> None:
+        """Write STEP assemblies. A file appears whole or not at all.
+
+        Parameters
+        ----------
+        *paths : path-like
+            Ending in .step or .stp. All are checked before any is written.
+        schema : {"ap214", "ap242"}
+        progress : callable, optional
+            Called with (stage, done, total).
 
         Raises
         ------
@@ -92,7 +101,7 @@ class Assembly:
         """
         from gyroid_cad.kernel.assembly import write_assembly
 
-        require_assembly_formats(targets)
+        targets = require_formats(paths, [STEP])
         require_memory(self.cells, _BYTES_PER_INSTANCE)
         if not self.cell.valid(progress):
             raise KernelError("the kernel finds the solid of one cell invalid; nothing was written")

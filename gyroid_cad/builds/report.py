@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gyroid_cad.builds.solid import Build
-from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
+from gyroid_cad.common.tables import Rows, cells_shown, islands_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.surface.fit_report import fit_report
 
@@ -27,8 +27,13 @@ class LatticeReport:
     thickness, min_thickness, max_thickness : float
         Whole wall in mm: its mean over the mid-surface and its extremes.
     density : float
-        Volume fraction: of a cell, or of the mapped block where the lattice is graded.
+        Volume fraction: of a cell, of the mapped block where the lattice is graded, or of what is left of a block
+        that is cut.
     patches, faces, solids : int
+    islands, dropped : int
+        Pieces that a trimmed lattice has besides the largest one, and small ones that were dropped.
+    islands_volume, dropped_volume : float
+        Of either, in mm3.
     control_points : int
         Along each side of a patch.
     valid, closed : bool
@@ -39,7 +44,7 @@ class LatticeReport:
         Lines through the wall in which patches touch without joining.
     volume, volume_exact : float
         In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
-        where the lattice is graded; the latter none of a graded lattice that is cut.
+        where the lattice is graded; the latter without what was dropped, and none of a graded lattice that is cut.
     area : float
         In mm2, of all that bounds the solid: both faces, and side walls or flat sides.
     max_deviation : float
@@ -65,6 +70,10 @@ class LatticeReport:
     patches: int
     faces: int
     solids: int
+    islands: int
+    islands_volume: float
+    dropped: int
+    dropped_volume: float
     control_points: int
     valid: bool
     closed: bool
@@ -90,6 +99,7 @@ class LatticeReport:
             ("cells", cells_shown(self.cells, self.cell_size, self.cells_alike)),
             ("wall", wall_shown(self.thickness, self.min_thickness, self.max_thickness, self.density)),
             ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
+            *([("islands", self._islands_shown())] if self.islands or self.dropped else []),
             ("boundary edges, non-manifold edges", f"{self.boundary_edges}, {self.non_manifold_edges}"),
             ("volume", volume_shown(self.volume, self.volume_exact)),
             ("area", f"{self.area:.8g} mm2"),
@@ -99,6 +109,9 @@ class LatticeReport:
 
     def __str__(self) -> str:
         return text_table(self.rows())
+
+    def _islands_shown(self) -> str:
+        return islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)
 
     def _deviation_shown(self) -> str:
         n = self.control_points
@@ -142,6 +155,10 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
         patches=built.patches,
         faces=built.topology.faces,
         solids=built.topology.solids,
+        islands=built.islands.kept,
+        islands_volume=built.islands.kept_volume,
+        dropped=built.islands.dropped,
+        dropped_volume=built.islands.dropped_volume,
         control_points=len(fitted.wall.weights),
         valid=built.valid(),
         closed=built.topology.closed,

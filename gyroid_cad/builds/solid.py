@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.choices import Schema
@@ -17,19 +19,17 @@ from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.box import Box, cut_to_box
+from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
 from gyroid_cad.wall.areas import fitted_areas
-from gyroid_cad.wall.covering import PERTURBATIONS
+from gyroid_cad.wall.covering import PERTURBATIONS, first_success
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = [
-    "Build",
-    "build",
-    "require_settings",
-    "write_shape",
-]
+__all__ = ["Build", "build", "require_settings", "write_shape"]
+
+Floats = NDArray[np.float64]
 
 # Peak memory a cell, as benchmarks/memory.py measures it, rounded up.
 _SOLID_BYTES_PER_CELL = 1_500_000
@@ -51,6 +51,8 @@ class Build:
     volume : float
         In mm3, from the control points the kernel holds.
     patches : int
+    islands : Islands
+        Of a lattice that was cut.
     shift : tuple of float
         Of the lattice in its box, in mm, where it could not be cut without.
     seconds : dict
@@ -62,6 +64,7 @@ class Build:
         self.seconds = dict(fitted.seconds)
         self._valid: bool | None = None
         self.shift = (0.0, 0.0, 0.0)
+        self.islands = Islands()
         self._cut_area = 0.0
         self._require_memory(_SOLID_BYTES_PER_CELL)
         with self.timed("kernel", progress):
@@ -69,7 +72,10 @@ class Build:
             from gyroid_cad.kernel.solid import build_solid
         wall = fitted.wall
         if fitted.spec.trimmed:
-            self._shape, self.volume, self.patches = self._trimmed(progress)
+            self._shape, self.volume, self.patches = first_success(
+                partial(self._trimmed, np.array(phase) * fitted.spec.grading.cell_size, progress)
+                for phase in PERTURBATIONS
+            )
             expected, agreement = self._volume_in_box(), _BOXED_VOLUME_AGREEMENT
         else:
             with self.timed("solid", progress):
@@ -78,38 +84,39 @@ class Build:
             expected, agreement = wall.volume(), _VOLUME_AGREEMENT
         with self.timed("check", progress):
             self.topology = topology(self._shape)
-            self._require_closed_and_full(expected, agreement)
+            self._require_closed_and_full(self.volume + self.islands.dropped_volume, expected, agreement)
 
     @property
     def cells(self) -> tuple[int, int, int]:
         return self.fitted.spec.cells
 
-    def _trimmed(self, progress: Progress | None) -> tuple[KernelShape, float, int]:
-        """The shape cut to the block of cells, its volume, and how many patches are in it."""
+    @property
+    def density(self) -> float:
+        """Volume by that of the block of cells before any map."""
+        return self.volume / (prod(self.cells) * self.fitted.spec.grading.cell_size**3)
+
+    def _trimmed(self, shift: Floats, progress: Progress | None) -> tuple[KernelShape, float, int]:
+        """Return the shape cut to the block of cells, its volume, and how many patches are in it."""
         from gyroid_cad.kernel.split import compound_of
         from gyroid_cad.kernel.trimmed import build_trimmed
 
-        size = self.fitted.spec.grading.cell_size
+        spec = self.fitted.spec
+        size = spec.grading.cell_size
         box = Box(np.eye(3), np.zeros(3), np.array(self.cells) * size)
-        problem: KernelError | None = None
-        for phase in PERTURBATIONS:
-            shift = np.array(phase) * size
-            try:
-                with self.timed("cut", progress):
-                    # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
-                    left = cut_to_box(
-                        self.fitted.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True
-                    )
-                with self.timed("solid", progress):
-                    solids = build_trimmed(left)
-            except KernelError as failed:
-                problem = problem or failed
-                continue
-            self._cut_area = float(left.areas.sum())
-            self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
-            shape = solids[0] if len(solids) == 1 else compound_of(solids)
-            return shape, float(left.volumes.sum()), len({face.patch for face in left.faces})
-        raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
+        with self.timed("cut", progress):
+            # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
+            left = cut_to_box(self.fitted.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True)
+        with self.timed("solid", progress):
+            solids = build_trimmed(left)
+        volumes = left.volumes.tolist()
+        kept = kept_pieces(volumes, sum(volumes) / prod(self.cells), island_rule(spec.keep_islands))
+        self.islands = islands_of(volumes, kept)
+        self._cut_area = float(left.areas[kept].sum())
+        self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
+        shape = solids[kept[0]] if len(kept) == 1 else compound_of(solids[piece] for piece in kept)
+        of_faces = left.component[: len(left.faces)].tolist()
+        patches = {face.patch for face, piece in zip(left.faces, of_faces, strict=True) if piece in kept}
+        return shape, sum(volumes[piece] for piece in kept), len(patches)
 
     def _volume_in_box(self) -> float | None:
         """Volume of the wall in whole uniform cells, in mm3; None where they vary."""
@@ -164,15 +171,15 @@ class Build:
     def _require_memory(self, bytes_per_cell: int) -> None:
         require_memory(self.cells, bytes_per_cell, len(self.fitted.wall.weights))
 
-    def _require_closed_and_full(self, expected: float | None, agreement: float) -> None:
+    def _require_closed_and_full(self, volume: float, expected: float | None, agreement: float) -> None:
         if not self.topology.closed:
             raise KernelError(
                 f"the kernel's shape of {self.cells} cells is not closed: "
                 f"{self.topology.open_edges} edges do not bound exactly two faces"
             )
-        if expected is not None and not abs(self.volume - expected) <= agreement * expected:
+        if expected is not None and not abs(volume - expected) <= agreement * expected:
             raise KernelError(
-                f"the kernel's shape of {self.cells} cells encloses {self.volume:.9g} mm3, "
+                f"the kernel's shape of {self.cells} cells encloses {volume:.9g} mm3, "
                 f"its control nets {expected:.9g} mm3"
             )
 

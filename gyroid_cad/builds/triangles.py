@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
 from dataclasses import asdict, dataclass
 from math import ceil, prod
-from pathlib import Path
 from typing import Any
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import THREE_MF, format_of
+from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
@@ -44,8 +43,15 @@ class Triangles:
         with timed(self.seconds, "triangles", progress):
             self.triangulation = triangulated(fitted.wall, deviation)
 
-    def write(self, targets: Sequence[Path], progress: Progress | None = None) -> None:
-        """Write the triangles to each target in the format of its ending.
+    def write(self, *paths: str | os.PathLike[str], progress: Progress | None = None) -> None:
+        """Write files; each path's ending chooses STL (.stl) or 3MF (.3mf). A file appears whole or not at all.
+
+        Parameters
+        ----------
+        *paths : path-like
+            All are checked before any is written.
+        progress : callable, optional
+            Called with (stage, done, total).
 
         Raises
         ------
@@ -53,6 +59,7 @@ class Triangles:
             If a file cannot count so many triangles, or memory would not do for 3MF.
         ExportError
         """
+        targets = require_formats(paths, TRIANGLE_FORMATS)
         if any(format_of(path) is THREE_MF for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count

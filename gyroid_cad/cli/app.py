@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,7 @@ from gyroid_cad.cli.report import report_command
 from gyroid_cad.cli.view import view_command
 from gyroid_cad.common.files import file_sizes
 from gyroid_cad.common.formats import PART_FORMATS, listed_endings
+from gyroid_cad.errors import IslandsWarning
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
@@ -177,9 +179,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     session = Session()
     try:
         # Not commands.main: it would put an empty line before the one that says "interrupted".
-        with commands.make_context(
-            PROGRAM, list(sys.argv[1:] if arguments is None else arguments), obj=session
-        ) as context:
+        with (
+            commands.make_context(
+                PROGRAM, list(sys.argv[1:] if arguments is None else arguments), obj=session
+            ) as context,
+            warnings.catch_warnings(),
+        ):
+            # The tables and the JSON tell of them.
+            warnings.simplefilter("ignore", IslandsWarning)
             commands.invoke(context)
         return DONE
     except click.exceptions.Exit as left:

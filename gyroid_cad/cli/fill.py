@@ -62,7 +62,13 @@ __all__ = ["fill_command"]
 @click.option(
     "--control-points", type=int, default=10, show_default=True, metavar="N", help="Of a patch, along a side."
 )
-@click.option("--drop-islands", is_flag=True, help="Leave out pieces cut off from the largest one.")
+@click.option(
+    "--drop-islands",
+    is_flag=True,
+    help="Drop all pieces not connected to the largest one; small ones, of less than a hundredth of what a cell holds, "
+    "are dropped anyway.",
+)
+@click.option("--keep-islands", is_flag=True, help="Keep small ones too.")
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
 @deviation_option

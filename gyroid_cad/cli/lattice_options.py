@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 _WALL_OPTIONS = ("thickness", "density", "porosity")
-_OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map", "trim")
+_OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map", "trim", "keep_islands")
 _PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
@@ -126,6 +126,12 @@ _OPTIONS = (
         "--trim", type=click.Choice(TRIMS), help="Cut to the block of cells: flat sides instead of whole patches."
     ),
     click.option(
+        "--keep-islands",
+        is_flag=True,
+        help="Of a trimmed lattice: keep small pieces that the cut leaves unconnected, of less than a hundredth of "
+        "what a cell holds.",
+    ),
+    click.option(
         "--tolerance",
         type=float,
         metavar="PART",
@@ -201,7 +207,7 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     fit = _fit_settings(given["fit"], given["control_points"])
     _require_given(given, "cells")
     if any(given[name] is not None for name in _PAPER_OPTIONS):
-        mixed = [name for name in _OWN_OPTIONS if given[name] is not None]
+        mixed = [name for name in _OWN_OPTIONS if given[name] not in (None, False)]
         if mixed or given["thickness_factor"] is None:
             raise click.UsageError(
                 f"{_listed(_PAPER_OPTIONS)} are the paper's units: they need {_listed(_PAPER_OPTIONS[:1])}, and not "
@@ -211,7 +217,10 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
     _require_given(given, "cell_size")
     require_one_wall(given)
-    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "trim", "surface")}
+    own = {
+        name: given[name]
+        for name in ("thickness", "scale_field", "map", "tolerance", "trim", "surface", "keep_islands")
+    }
     return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, fit=fit)
 
 

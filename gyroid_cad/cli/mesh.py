@@ -69,14 +69,14 @@ def mesh_command(
     gyroid-cad mesh -o shell.bdf --cells 2 2 2 --cell-size 10 --thickness 1 --subdivisions 8 --layers 0
     """
     start = time.perf_counter()
-    from gyroid_cad.mesh.finite_elements.files import require_mesh_format, write_mesh
+    from gyroid_cad.mesh.finite_elements.files import require_mesh_format
 
     if subdivisions is None:
         raise click.UsageError("Missing option '--subdivisions'.")
     lattice = lattice_of(given)
     if not output:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    targets = require_distinct(output, lambda path: require_mesh_format(path, full))
+    require_distinct(output, lambda path: require_mesh_format(path, full))
     if histogram is not None:
         from gyroid_cad.mesh.finite_elements.summaries import draw_quality, require_histogram
 
@@ -96,9 +96,7 @@ def mesh_command(
             from gyroid_cad.builds.meshes import mesh_quality
 
             measured = mesh_quality(made)
-        for target in targets:
-            with timed({}, f"write {target.name}", progress):
-                write_mesh(made, target, pairs, progress)
+        made.write(*output, pairs=pairs, progress=progress)
         if measured is not None and histogram is not None:
             draw_quality(measured, histogram)
     files = file_sizes([*output, *([histogram] if histogram else [])])
@@ -148,19 +146,16 @@ def volumes_command(output: tuple[str, ...], degree: int, as_json: bool, quiet: 
     gyroid-cad volumes -o cell.mesh -o cell.xml --cells 1 1 1 --cell-size 10 --density 0.3 --degree 3
     """
     start = time.perf_counter()
-    from gyroid_cad.mesh.iga.files import write_volumes
 
     lattice = lattice_of(given)
     if not output:
         raise click.UsageError("Missing option '-o' / '--output'.")
-    targets = require_formats(output, VOLUME_FORMATS)
+    require_formats(output, VOLUME_FORMATS)
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.fitted(progress)
         with timed({}, "volumes", progress):
             made = lattice.volumes(degree)
-        for target in targets:
-            with timed({}, f"write {target.name}", progress):
-                write_volumes(made, target)
+        made.write(*output, progress=progress)
     files, seconds = file_sizes(output), time.perf_counter() - start
     summary = {
         "patches": len(made),

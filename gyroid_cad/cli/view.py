@@ -19,14 +19,17 @@ _TOML_ENDING = ".toml"
 @click.command("view")
 @lattice_options_beside("LATTICE.toml|FILE")
 @click.option(
+    "-o",
+    "--output",
     "--screenshot",
+    "screenshot",
     metavar="FILE.png",
     shell_complete=file_paths,
-    help="Draw into a file, off screen, instead of opening a window.",
+    help="Draw into a file instead of opening a window; no display is needed.",
 )
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
-    """Show a lattice, or a .step, .stp, .brep or .stl file, in CadQuery's viewer.
+    """Show a lattice, or a .step, .stp, .brep, .stl or .3mf file, in CadQuery's viewer.
 
     The lattice is described as for "build", by options or in a TOML file; no solid is built unless it is trimmed.
     STEP files are shown in their own colours. In the window: drag to turn, wheel to zoom, q to leave.
@@ -34,7 +37,7 @@ def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
     \b
     gyroid-cad view --cells 2 2 2 --cell-size 10 --thickness 0.8
     gyroid-cad view part.step
-    gyroid-cad view lattice.toml --screenshot lattice.png
+    gyroid-cad view lattice.toml -o lattice.png
     """
     from gyroid_cad.cli.viewer import view
 

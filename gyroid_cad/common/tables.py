@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["Rows", "cells_shown", "text_table", "volume_shown", "wall_shown"]
+__all__ = ["Rows", "cells_shown", "islands_shown", "text_table", "volume_shown", "wall_shown"]
 
 Rows = list[tuple[str, str]]
 
@@ -46,3 +46,9 @@ def volume_shown(volume: float, exact: float | None) -> str:
     """Volume in mm3, and how far it is off the exact one where that is known."""
     error = "" if exact is None else f", {volume / exact - 1:+.1e} of the exact one"
     return f"{volume:.8g} mm3{error}"
+
+
+def islands_shown(kept: int, kept_volume: float, dropped: int, dropped_volume: float) -> str:
+    """Pieces that are left besides the largest one, and those that were dropped, with their volumes in mm3."""
+    counted = (("left", kept, kept_volume), ("dropped", dropped, dropped_volume))
+    return ", ".join(f"{count} {what}" + (f" ({volume:.4g} mm3)" if volume else "") for what, count, volume in counted)

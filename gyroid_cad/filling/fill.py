@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,28 +18,28 @@ from gyroid_cad.common.checks import finite_number, positive_number, three_numbe
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.common.tables import Rows, text_table
+from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
-from gyroid_cad.filling.part import Filling, Outcome
+from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.kernel.check import topology
-from gyroid_cad.kernel.part import Part, require_part, selected_faces
+from gyroid_cad.kernel.part import Part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.split import compound_of
-from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.islands import Islands, island_rule
 from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 
-__all__ = ["FillReport", "Filled", "fill", "part_of"]
+__all__ = ["FillReport", "Filled", "fill"]
 
 Floats = NDArray[np.float64]
 
@@ -68,10 +68,10 @@ class FillReport:
         Of the surface, in mm2.
     mass, part_mass : float, optional
         In g, for a material's density.
-    islands : int
-        Pieces besides the largest one of each domain.
-    dropped : int
-        Islands left out.
+    islands, dropped : int
+        Pieces besides the largest one of each domain, and pieces that were dropped.
+    islands_volume, dropped_volume : float
+        Of either, in mm3; of the bare surface 0.
     cut_patches, whole_patches : int
         That the part's boundary may cross, and that lie wholly inside.
     by_sections : bool
@@ -98,7 +98,9 @@ class FillReport:
     mass: float | None
     part_mass: float | None
     islands: int
+    islands_volume: float
     dropped: int
+    dropped_volume: float
     cut_patches: int
     whole_patches: int
     by_sections: bool
@@ -121,7 +123,7 @@ class FillReport:
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
             ("area", f"{self.area:.6g} mm2"),
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
-            ("islands", f"{self.islands} left, {self.dropped} dropped"),
+            ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
             *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
         ]
 
@@ -208,6 +210,7 @@ def fill(
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
+    keep_islands: bool = False,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -228,7 +231,9 @@ def fill(
         Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
     fit : FitSettings, optional
     drop_islands : bool
-        Whether to leave out pieces cut off from the largest one.
+        Drop every island: pieces not connected to the largest one. If not, small ones are dropped, which have less
+        than a hundredth of what one cell holds, and of the largest piece (of the bare surface, by area). The report
+        counts what is left or dropped, and an :class:`~gyroid_cad.IslandsWarning` says so.
     material_density : float, optional
         In g/cm3, for the masses in the report.
     progress : callable, optional
@@ -244,6 +249,8 @@ def fill(
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
         size, thickness, density and surface are its own.
     surface : {"gyroid", "diamond", "primitive"}
+    keep_islands : bool
+        Keep every island, however small.
 
     Returns
     -------
@@ -263,6 +270,7 @@ def fill(
         raise ParameterError("openings", openings, "none without a skin")
     if shell is not None and kind == SURFACE:
         raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
+    rule = island_rule(keep_islands, drop_islands)
     closeness = USUAL_TOLERANCE if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     regions, size, infill_in = _described(
@@ -273,7 +281,10 @@ def fill(
     core = whole if hollow is None else hollow.core
     filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
     outcome = filling.run(frame)
-    return _reported(filling, outcome, kind, shell, drop_islands, grams)
+    domains, islands = without_islands(outcome.domains, filling.cells, rule)
+    made = _reported(filling, replace(outcome, domains=domains), islands, kind, shell, grams)
+    islands.warn("drop_islands drops")
+    return made
 
 
 _InfillIn = Callable[["Part", Frame, Callable[[str], AbstractContextManager[None]]], Infill]
@@ -324,14 +335,10 @@ def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
 
 
 def _reported(
-    filling: Filling, outcome: Outcome, kind: Kind, skin: float | None, drop_islands: bool, grams: float | None
+    filling: Filling, outcome: Outcome, islands: Islands, kind: Kind, skin: float | None, grams: float | None
 ) -> Filled:
 
     domains = outcome.domains
-    islands, dropped = sum(len(some) - 1 for some in domains.values()), 0
-    if drop_islands and islands:
-        islands, dropped = 0, islands
-        domains = {name: some[:1] for name, some in domains.items()}
     shapes = {
         name: some[0].shape if len(some) == 1 else compound_of(made.shape for made in some)
         for name, some in domains.items()
@@ -356,8 +363,10 @@ def _reported(
         area=sum(made.area for some in domains.values() for made in some),
         mass=None if grams is None else grams * volume,
         part_mass=None if grams is None else grams * filling.part.volume,
-        islands=islands,
-        dropped=dropped,
+        islands=islands.kept,
+        islands_volume=islands.kept_volume,
+        dropped=islands.dropped,
+        dropped_volume=islands.dropped_volume,
         cut_patches=outcome.cut,
         whole_patches=outcome.whole,
         by_sections=outcome.by_sections,
@@ -365,31 +374,6 @@ def _reported(
         seconds=dict(filling.seconds),
     )
     return Filled(shapes, report)
-
-
-def part_of(given: Any) -> Part:
-    """The closed, valid solids of whatever a user gives as a part.
-
-    Parameters
-    ----------
-    given : shape, Workplane or path-like
-        As of :func:`fill`.
-
-    Raises
-    ------
-    ParameterError
-    ExportError
-        If a file is no STEP file or holds no shape.
-    """
-
-    if isinstance(given, str | os.PathLike):
-        return require_part(read_step(given))
-    if hasattr(given, "vals"):
-        return require_part(compound_of(shape.wrapped for shape in given.vals()))
-    shape = getattr(given, "wrapped", given)
-    if not hasattr(shape, "ShapeType"):
-        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
-    return require_part(shape)
 
 
 def _turn(degrees: Floats) -> Floats:

@@ -22,11 +22,11 @@ from gyroid_cad.wall.covering import (
     Frame,
     covering_complex,
     nearest_offsets,
+    patch_sides,
     periodic_offsets,
-    sides_of_points,
     wall_extremes,
 )
-from gyroid_cad.wall.exact import offset_patches, patch_points
+from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
@@ -71,12 +71,12 @@ class Infill:
         """Side of a part on which each patch lies, or that it may be crossed, as :func:`covering.patch_sides` tells."""
         samples = np.linspace(-1, 1, SIDE_SAMPLES)
         if self.endless:
-            own = patch_points(self.complex, self.grading.cell_size, samples)
+            own = patch_points_and_normals(self.complex, self.grading.cell_size, samples)[0]
         else:
             fitted = [some.points for _, some in offset_patches(self.complex, self.grading, samples)]
             own = np.concatenate(fitted).reshape(-1, SIDE_SAMPLES**2, 3)
         points = self.frame.placed(own)
-        return sides_of_points(self.complex, points, self.max_thickness / 2, distance, contains)
+        return patch_sides(self.complex, points, self.max_thickness / 2, distance, contains)
 
     def offsets(self, points: Floats) -> Floats:
         """Signed distance of points of the part's space from an endless mid-surface, in mm."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,20 +15,22 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
-from gyroid_cad.errors import KernelError
+from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.kernel.check import is_valid, topology
-from gyroid_cad.kernel.part import Part, measure
+from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.kernel.split import bounded_solids, compound_of, connected_shells
+from gyroid_cad.kernel.step import read_step
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
-from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame
+from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
+from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome"]
+__all__ = ["Filling", "Made", "Outcome", "part_of", "without_islands"]
 
 Floats = NDArray[np.float64]
 
@@ -104,6 +108,11 @@ class Filling:
         """The part that is filled: the whole one, or what its skin leaves of it."""
         return self.part if self.hollow is None else self.hollow.core
 
+    @property
+    def cells(self) -> float:
+        """How many cells have the volume of what is filled."""
+        return self.core.volume / self.cell_size**3
+
     def run(self, frame: Frame) -> Outcome:
         """Fill, with the lattice a little shifted where the kernel does not manage otherwise.
 
@@ -114,7 +123,6 @@ class Filling:
         points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
         with self.timed("cover"):
             points = points[self.core.contains(points)]
-        problem: KernelError | None = None
         # Booleans the last time in one process: should it be the joining of regions that fails.
         attempts: list[tuple[Point, bool, int | None]] = [
             (phase, False, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
@@ -122,19 +130,16 @@ class Filling:
         if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
             # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
             attempts = [(phase, True, None) for phase in PERTURBATIONS] + attempts
-        for phase, by_sections, processes in attempts:
-            shift = np.array(phase) * self.cell_size
-            try:
-                return self._filled(replace(frame, origin=frame.origin + shift), shift, points, by_sections, processes)
-            except KernelError as failed:
-                problem = problem or failed
-        raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
+        return first_success(
+            partial(self._filled, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
+            for phase, by_sections, processes in attempts
+        )
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
 
     def _filled(self, frame: Frame, shift: Floats, points: Floats, by_sections: bool, processes: int | None) -> Outcome:
-        infill = self.infill_in(frame, self.timed)
+        infill = self.infill_in(replace(frame, origin=frame.origin + shift), self.timed)
         # A block's own side walls are none of the faces that sections are found of.
         by_sections = by_sections and infill.endless
         made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
@@ -245,6 +250,53 @@ class Filling:
         if not (valid and closed):
             state = "valid" if valid else "invalid"
             raise KernelError(f"the kernel's filled part is {state}, with {counted.open_edges} open edges")
+
+
+def without_islands(
+    domains: dict[str, list[Made]], cells: float, rule: IslandRule
+) -> tuple[dict[str, list[Made]], Islands]:
+    """Return the pieces of every domain that a rule keeps, and what is left or dropped besides the largest ones.
+
+    Parameters
+    ----------
+    domains : dict
+        As of :class:`Outcome`.
+    cells : float
+        How many cells what is filled is as large as.
+    rule : IslandRule
+    """
+    chosen, islands = {}, Islands()
+    for name, some in domains.items():
+        sizes = [_size(piece) for piece in some]
+        kept = kept_pieces(sizes, sum(sizes) / cells, rule)
+        chosen[name] = [some[index] for index in kept]
+        islands += islands_of([piece.volume for piece in some], kept)
+    return chosen, islands
+
+
+def part_of(given: Any) -> Part:
+    """The closed, valid solids of whatever a user gives as a part.
+
+    Parameters
+    ----------
+    given : shape, Workplane or path-like
+        As of :func:`fill`.
+
+    Raises
+    ------
+    ParameterError
+    ExportError
+        If a file is no STEP file or holds no shape.
+    """
+
+    if isinstance(given, str | os.PathLike):
+        return require_part(read_step(given))
+    if hasattr(given, "vals"):
+        return require_part(compound_of(shape.wrapped for shape in given.vals()))
+    shape = getattr(given, "wrapped", given)
+    if not hasattr(shape, "ShapeType"):
+        raise ParameterError("part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, or a STEP file")
+    return require_part(shape)
 
 
 def _size(made: Made) -> float:

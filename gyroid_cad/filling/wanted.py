@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import KINDS, Kind
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
@@ -132,9 +131,11 @@ def _wall(
 
 def _network(kind: Kind, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
     low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
-    accepted = f"the network's volume fraction, one number above {low:.5f} and below {high:.5f}"
-    fraction = finite_number("density", density, accepted)
-    if not low < fraction < high:
+    meaning = "the network's volume fraction"
+    accepted = f"{meaning}, one number above {low:.5f} and below {high:.5f}"
+    fraction = as_field("density", density, meaning)
+    # Only an offset of the mid-surface that is the same everywhere bounds a network of this density.
+    if not isinstance(fraction, float) or not low < fraction < high:
         raise ParameterError("density", density, accepted)
     offset = float(tube.network_offset(fraction) * cell_size)
     end = float(np.sign(offset)) if offset else 0.0

@@ -26,14 +26,11 @@ from OCP.TopoDS import TopoDS_Shape
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
-from gyroid_cad.nurbs.surface import NurbsSurface, grid_derivatives
+from gyroid_cad.nurbs.surface import NurbsSurface, face_integrals
 
 __all__ = ["Topology", "enclosed_volume", "is_valid", "parts_of", "topology"]
 
 Floats = NDArray[np.float64]
-
-# So few that what is computed for them stays in the processor's cache.
-_SURFACES_AT_ONCE = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,15 +120,9 @@ def _fluxes(surfaces: list[NurbsSurface]) -> list[tuple[float, Floats]]:
         alike.setdefault(key, []).append(index)
     found: dict[int, tuple[float, Floats]] = {}
     for indices in alike.values():
-        for first in range(0, len(indices), _SURFACES_AT_ONCE):
-            chosen = indices[first : first + _SURFACES_AT_ONCE]
-            one = surfaces[chosen[0]]
-            u, v, weights = one.quadrature()
-            nets = np.stack([surfaces[index].control_points for index in chosen])
-            points, du, dv = grid_derivatives(nets, one.weights, (one.knots_u, one.knots_v), u.ravel(), v.ravel())
-            area = np.cross(du, dv) * weights[..., np.newaxis]
-            flux = np.einsum("puvc,puvc->p", points, area) / 3
-            found.update(zip(chosen, zip(flux.tolist(), area.sum(axis=(1, 2)), strict=True), strict=True))
+        one, nets = surfaces[indices[0]], np.stack([surfaces[index].control_points for index in indices])
+        summed = face_integrals(nets, one.weights, (one.knots_u, one.knots_v), *one.quadrature())
+        found.update((index, (float(row[0]), row[1:4])) for index, row in zip(indices, summed, strict=True))
     return [found[index] for index in range(len(surfaces))]
 
 

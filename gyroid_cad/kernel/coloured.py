@@ -3,43 +3,62 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
 
-from OCP.BRep import BRep_Builder
+import numpy as np
+from numpy.typing import NDArray
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Quantity import Quantity_Color
 from OCP.STEPCAFControl import STEPCAFControl_Reader
-from OCP.TDF import TDF_Label
+from OCP.TCollection import TCollection_AsciiString
+from OCP.TDF import TDF_Label, TDF_Tool
 from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_FACE
-from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Compound, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Shape
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_ColorTool, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.assembly import new_document
+from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence, NumberedShapes
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.step import no_messages
 
-__all__ = ["Colour", "coloured_shapes"]
+__all__ = ["Colour", "ColouredPart", "coloured_parts", "extent_of"]
 
 # Red, green and blue, 0 to 1, as a screen has them (sRGB); none where the file says nothing.
 Colour = tuple[float, float, float] | None
-Coloured = tuple[TopoDS_Shape, Colour]
+
+Floats = NDArray[np.float64]
 
 
-def coloured_shapes(path: str | os.PathLike[str]) -> list[Coloured]:
-    """All shapes of a STEP file in their places, each of one colour: a part of several is taken apart by its faces.
+@dataclass(frozen=True, slots=True, eq=False)
+class ColouredPart:
+    """A part of a STEP file, and where it is found.
+
+    Attributes
+    ----------
+    shape : TopoDS_Shape
+    colours : tuple of Colour
+        Of its faces, as ``TopExp_Explorer`` counts them.
+    places : ndarray, shape (k, 3, 4)
+        Of each occurrence: rotation, and translation in mm in the last column.
+    """
+
+    shape: TopoDS_Shape
+    colours: tuple[Colour, ...]
+    places: Floats
+
+
+def coloured_parts(path: str | os.PathLike[str]) -> list[ColouredPart]:
+    """Parts of a STEP file, each once for every colour it occurs in.
 
     Parameters
     ----------
     path : path-like
-
-    Returns
-    -------
-    list of (TopoDS_Shape, Colour)
-        Occurrences of a part share its geometry and, once one of them is meshed, its triangles.
 
     Raises
     ------
@@ -52,51 +71,68 @@ def coloured_shapes(path: str | os.PathLike[str]) -> list[Coloured]:
             raise ExportError(f"{path} could not be read as STEP")
     free = LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
-    found = _Parts(document)
-    shapes = [one for label in _labels(free) for one in found.placed(label, TopLoc_Location(), None)]
-    if not shapes:
+    found = _Occurrences(document)
+    for label in _labels(free):
+        found.add(label, TopLoc_Location(), None)
+    if not found.places:
         raise ExportError(f"{path} holds no shape")
-    return shapes
+    return found.parts()
 
 
-class _Parts:
-    """Parts taken apart so far, by the entry of their label, each once however often it occurs."""
+def extent_of(parts: Sequence[ColouredPart]) -> float:
+    """Diagonal of a box round all parts in all their places, in mm; a little larger than need be."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for part in parts:
+        corners = np.array(list(product(*corners_of(box_round([part.shape])).T)))
+        places = corners @ part.places[..., :3].swapaxes(-1, -2) + part.places[:, np.newaxis, :, 3]
+        low, high = np.minimum(low, places.min(axis=(0, 1))), np.maximum(high, places.max(axis=(0, 1)))
+    return float(np.linalg.norm(high - low))
+
+
+class _Occurrences:
+    """Where parts occur, by the entries of their labels and the colours that their occurrences put over them."""
 
     def __init__(self, document: TDocStd_Document) -> None:
         self._colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
-        self._parts: dict[int, list[Coloured]] = {}
+        self._labels: dict[str, TDF_Label] = {}
+        self.places: dict[tuple[str, Colour], list[Floats]] = {}
 
-    def placed(self, label: TDF_Label, location: TopLoc_Location, over: Colour) -> Iterator[Coloured]:
-        """Shapes of a label, moved; a colour of the occurrence goes before that of the part."""
+    def add(self, label: TDF_Label, location: TopLoc_Location, over: Colour) -> None:
+        """Add what a label holds, moved; a colour of the occurrence goes before that of the part."""
         if XCAFDoc_ShapeTool.IsReference_s(label):
             part = TDF_Label()
             XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
             own = XCAFDoc_ShapeTool.GetLocation_s(label)
-            yield from self.placed(part, location.Multiplied(own), over or self._colour(label))
+            self.add(part, location.Multiplied(own), over or self._colour(label))
         elif XCAFDoc_ShapeTool.IsAssembly_s(label):
             components = LabelSequence()
             XCAFDoc_ShapeTool.GetComponents_s(label, components)
             for component in _labels(components):
-                yield from self.placed(component, location, over)
-        elif over is not None:
-            yield XCAFDoc_ShapeTool.GetShape_s(label).Moved(location), over
+                self.add(component, location, over)
         else:
-            for shape, colour in self._taken_apart(label):
-                yield shape.Moved(location), colour
+            entry = TCollection_AsciiString()
+            TDF_Tool.Entry_s(label, entry)
+            self._labels[entry.ToCString()] = label
+            self.places.setdefault((entry.ToCString(), over), []).append(_matrix(location))
 
-    def _taken_apart(self, label: TDF_Label) -> list[Coloured]:
-        shape, whole = XCAFDoc_ShapeTool.GetShape_s(label), self._colour(label)
-        key = shape.TShape().__hash__()
-        if key not in self._parts:
-            coloured = self._coloured_faces(label)
-            self._parts[key] = _by_colour(shape, whole, coloured) if coloured else [(shape, whole)]
-        return self._parts[key]
+    def parts(self) -> list[ColouredPart]:
+        """Every part in the places found."""
+        return [
+            ColouredPart(
+                shape := XCAFDoc_ShapeTool.GetShape_s(self._labels[entry]),
+                tuple(over or colour for colour in self._face_colours(self._labels[entry], shape)),
+                np.array(places),
+            )
+            for (entry, over), places in self.places.items()
+        ]
 
-    def _coloured_faces(self, label: TDF_Label) -> list[Coloured]:
-        subshapes = LabelSequence()
+    def _face_colours(self, label: TDF_Label, shape: TopoDS_Shape) -> Iterator[Colour]:
+        subshapes, numbered = LabelSequence(), NumberedShapes()
         XCAFDoc_ShapeTool.GetSubShapes_s(label, subshapes)
-        every = [(XCAFDoc_ShapeTool.GetShape_s(one), self._colour(one)) for one in _labels(subshapes)]
-        return [(shape, colour) for shape, colour in every if colour and shape.ShapeType() == TopAbs_FACE]
+        own = {numbered.Add(XCAFDoc_ShapeTool.GetShape_s(one)): self._colour(one) for one in _labels(subshapes)}
+        whole = self._colour(label)
+        # A shape that the map does not hold has number 0.
+        return (own.get(numbered.FindIndex(face)) or whole for face in parts_of(shape, TopAbs_FACE))
 
     def _colour(self, label: TDF_Label) -> Colour:
         colour = Quantity_Color()
@@ -108,20 +144,9 @@ class _Parts:
         return None
 
 
-def _by_colour(shape: TopoDS_Shape, whole: Colour, coloured: list[Coloured]) -> list[Coloured]:
-    """The faces of a shape, those of one colour together."""
-    faces = NumberedShapes()
-    TopExp.MapShapes_s(shape, TopAbs_FACE, faces)
-    colours = dict.fromkeys(range(1, faces.Extent() + 1), whole)
-    colours |= {faces.FindIndex(face): colour for face, colour in coloured if faces.Contains(face)}
-    builder = BRep_Builder()
-    compounds: dict[Colour, TopoDS_Compound] = {}
-    for number, colour in colours.items():
-        if colour not in compounds:
-            compounds[colour] = TopoDS_Compound()
-            builder.MakeCompound(compounds[colour])
-        builder.Add(compounds[colour], faces.FindKey(number))
-    return [(compound, colour) for colour, compound in compounds.items()]
+def _matrix(location: TopLoc_Location) -> Floats:
+    placement = location.Transformation()
+    return np.array([[placement.Value(row, column) for column in range(1, 5)] for row in range(1, 4)])
 
 
 def _labels(sequence: LabelSequence) -> Iterator[TDF_Label]:

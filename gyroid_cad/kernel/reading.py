@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 # Of triangles to look at, in parts of the diagonal; and between them, in degrees.
 _SHOWN_DEVIATION = 5e-4
 _SHOWN_ANGLE = 20.0
+# Of triangles of however small a shape, in mm.
+_FINEST = 1e-6
 # Of what is read from files that were written with so many digits.
 _PARAMETER_TOLERANCE = 1e-9
 # What the first lines of a BREP file say, and how many bytes these take at most.
@@ -89,9 +91,19 @@ def described(shape: TopoDS_Shape) -> Described:
     return Described(topology(shape), is_valid(shape), tuple(low), tuple(high), volume, area)
 
 
-def shown_triangles(shape: TopoDS_Shape) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
-    """Triangles to look at: vertices, their numbers, and faces, as of :func:`gyroid_cad.kernel.stl.meshed_by_face`."""
-    return meshed_by_face(shape, "the picture", max(_SHOWN_DEVIATION * diagonal(shape), 1e-6), _SHOWN_ANGLE)
+def shown_triangles(
+    shape: TopoDS_Shape, extent: float | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+    """Triangles to look at: vertices, their numbers, and faces, as of :func:`gyroid_cad.kernel.stl.meshed_by_face`.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    extent : float, optional
+        Of all that is looked at, in mm; the shape's diagonal if left out.
+    """
+    deviation = _SHOWN_DEVIATION * (extent or diagonal(shape))
+    return meshed_by_face(shape, "the picture", max(deviation, _FINEST), _SHOWN_ANGLE)
 
 
 def lattice_sides(shape: TopoDS_Shape) -> list[int | None]:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.nurbs.surface import gauss_points, grid_derivatives
+from gyroid_cad.nurbs.basis import gauss_points
+from gyroid_cad.nurbs.surface import face_densities, face_integrals
 
 __all__ = ["SquareQuadrature"]
 
@@ -19,8 +20,6 @@ Integers = NDArray[np.int64]
 
 # The flux through a cubic face without weights has degree 8 along each side.
 _PER_SPAN = 9
-# Few at once, so that memory stays small.
-_FACES_AT_ONCE = 64
 
 
 class SquareQuadrature:
@@ -44,18 +43,12 @@ class SquareQuadrature:
 
     def densities(self, nets: Floats, weights: Floats) -> Floats:
         """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, nodes, nodes, 5)."""
-        points, du, dv = grid_derivatives(nets, weights, (self.knots, self.knots), self.places, self.places)
-        across = np.cross(du, dv)
-        flux = np.sum(points * across, axis=-1, keepdims=True) / 3
-        return np.concatenate([flux, across, np.linalg.norm(across, axis=-1, keepdims=True)], axis=-1)
+        return face_densities(nets, weights, (self.knots, self.knots), self.places, self.places)
 
     def over_square(self, nets: Floats, weights: Floats) -> Floats:
         """Integrals over whole faces; shape (faces, 5)."""
-        sums = [np.zeros((0, 5))]
-        for first in range(0, len(nets), _FACES_AT_ONCE):
-            density = self.densities(nets[first : first + _FACES_AT_ONCE], weights)
-            sums.append(np.einsum("u,v,fuvk->fk", self.weights, self.weights, density, optimize=True))
-        return np.concatenate(sums)
+        both = np.outer(self.weights, self.weights)
+        return face_integrals(nets, weights, (self.knots, self.knots), self.places, self.places, both)
 
     def over(self, places: Floats, rates: Floats, density: Floats) -> Floats:
         """Sum over places of a rate times the integral of a density along u, from -1 to the place.

@@ -5,9 +5,8 @@ Algorithms after Piegl and Tiller, The NURBS Book (2nd ed.); numbers such as A2.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from math import prod
 from typing import TypeVar
 
 import numpy as np
@@ -15,16 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.common.arrays import dot, freeze_arrays
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.nurbs.basis import basis, gauss_points, orders, quotients, rational_basis
 
 __all__ = [
     "NurbsCurve",
     "NurbsSurface",
-    "basis",
     "edge_row",
-    "gauss_points",
+    "face_densities",
+    "face_integrals",
+    "first_fold",
     "grid_derivatives",
     "grid_points",
-    "uniform_knots",
+    "layer_areas",
+    "layer_volumes",
+    "point_derivatives",
 ]
 
 Floats = NDArray[np.float64]
@@ -34,76 +37,8 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 # paper's weights, which vary sixfold, so many points leave 1e-12.
 _CUBIC_POINTS_PER_SPAN = 5
 _RATIONAL_POINTS_PER_SPAN = 24
-
-
-def uniform_knots(control_points: int, degree: int = 3) -> Floats:
-    """Clamped knot vector on [-1, 1] with evenly spaced inner knots; shape (control_points + degree + 1,)."""
-    inner = np.linspace(-1.0, 1.0, control_points - degree + 1)
-    return np.concatenate([np.full(degree, -1.0), inner, np.full(degree, 1.0)])
-
-
-def basis(knots: Floats, degree: int, parameters: ArrayLike, derivative: int = 0) -> Floats:
-    """B-spline basis functions, or a derivative of them (A2.2, eq. (2.9)), for all parameters at once.
-
-    Parameters
-    ----------
-    knots : ndarray, shape (n + degree + 1,)
-        Clamped.
-    degree : int
-    parameters : array_like, shape (m,)
-    derivative : int
-        Order of the derivative; 0 gives the functions themselves.
-
-    Returns
-    -------
-    ndarray, shape (m, n)
-    """
-    x = np.atleast_1d(np.asarray(parameters, float))
-    count = len(knots) - degree - 1
-    if derivative > degree:
-        return np.zeros((len(x), count))
-    span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
-    functions = np.zeros((len(x), len(knots) - 1))
-    functions[np.arange(len(x)), span] = 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for p in range(1, degree + 1):
-            width = knots[p:] - knots[:-p]
-            inverse = np.where(width > 0, 1 / width, 0.0)
-            if p > degree - derivative:
-                scaled = p * functions * inverse
-                functions = scaled[:, :-1] - scaled[:, 1:]
-            else:
-                scaled = functions * inverse
-                rising = (x[:, np.newaxis] - knots[: -p - 1]) * scaled[:, :-1]
-                falling = (knots[p + 1 :] - x[:, np.newaxis]) * scaled[:, 1:]
-                functions = rising + falling
-    return functions
-
-
-@lru_cache
-def _gauss_rule(count: int) -> tuple[Floats, Floats]:
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return nodes, weights
-
-
-def gauss_points(knots: Floats, per_span: int) -> tuple[Floats, Floats]:
-    """Gauss-Legendre points and weights on every span of a knot vector.
-
-    Parameters
-    ----------
-    knots : ndarray
-    per_span : int
-        Exact for polynomials of degree ``2 per_span - 1`` on each span.
-
-    Returns
-    -------
-    points, weights : ndarray, shape (spans * per_span,)
-    """
-    nodes, weights = _gauss_rule(per_span)
-    breaks = np.unique(knots)
-    half = np.diff(breaks)[:, np.newaxis] / 2
-    middle = (breaks[1:, np.newaxis] + breaks[:-1, np.newaxis]) / 2
-    return (middle + half * nodes).ravel(), (half * weights).ravel()
+# So few that what is computed for them stays in the processor's cache.
+_FACES_AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,8 +65,8 @@ class NurbsCurve:
 
     def evaluate(self, parameters: ArrayLike) -> Floats:
         """Points (A4.1); shape (m, 3)."""
-        functions = basis(self.knots, self.degree, parameters) * self.weights
-        return np.asarray(functions @ self.control_points / functions.sum(axis=1, keepdims=True))
+        places = np.atleast_1d(np.asarray(parameters, float))[:, np.newaxis]
+        return np.asarray(rational_basis(self.weights, (self.knots,), places)[0] @ self.control_points)
 
     def reversed(self) -> NurbsCurve:
         """Curve run backwards on the same domain."""
@@ -207,20 +142,16 @@ class NurbsSurface:
         """
         u, v = np.asarray(u, float), np.asarray(v, float)
         shape = np.broadcast_shapes(u.shape, v.shape)
-        open_grid = u.ndim == v.ndim == 2 and u.shape[1] == v.shape[0] == 1
-        if not open_grid:
+        given = (self.control_points[np.newaxis], self.weights, (self.knots_u, self.knots_v))
+        if u.ndim == v.ndim == 2 and u.shape[1] == v.shape[0] == 1:
+            found = grid_derivatives(*given, u.ravel(), v.ravel(), order)
+        else:
             u, v = np.broadcast_arrays(u, v)
-        along_u = [basis(self.knots_u, self.degree_u, u.ravel(), k) for k in range(order + 1)]
-        along_v = [basis(self.knots_v, self.degree_v, v.ravel(), k) for k in range(order + 1)]
-        homogeneous = _homogeneous(self.control_points, self.weights)
-        rows = [(b @ homogeneous.reshape(len(homogeneous), -1)).reshape(u.size, -1, 4) for b in along_u]
-        numerator = np.zeros((order + 1, order + 1, prod(shape), 4))
-        for k in range(order + 1):
-            for m in range(order + 1 - k):
-                row, functions = rows[k], along_v[m]
-                values = functions @ row if open_grid else np.einsum("pjc,pj->pc", row, functions)
-                numerator[k, m] = values.reshape(-1, 4)
-        return _quotient(numerator, order).reshape(order + 1, order + 1, *shape, 3)
+            found = point_derivatives(*given, u.reshape(1, -1), v.reshape(1, -1), order)
+        result = np.zeros((order + 1, order + 1, *shape, 3))
+        for (k, m), values in zip(orders(order, 2), found, strict=True):
+            result[k, m] = values.reshape(*shape, 3)
+        return result
 
     def normals(self, u: ArrayLike, v: ArrayLike) -> Floats:
         """Unit normals dS/du x dS/dv / |...|, the paper's eq. (20); shape (*broadcast, 3)."""
@@ -273,78 +204,167 @@ def edge_row(net: NDArray[Scalar], index: int) -> NDArray[Scalar]:
 
 
 def grid_derivatives(
-    nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike
-) -> tuple[Floats, Floats, Floats]:
-    """Points and first derivatives of many surfaces of one basis on one grid of parameters (A4.4).
+    nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike, order: int = 1
+) -> tuple[Floats, ...]:
+    """Points and derivatives of many surfaces of one basis on one grid of parameters (A4.4).
 
     Parameters
     ----------
-    nets : ndarray, shape (..., n, m, 3)
+    nets : ndarray, shape (..., n, m, components)
         Control points.
     weights : ndarray, shape (n, m)
     knots : tuple of ndarray
         Along u and v.
     u : array_like, shape (a,)
     v : array_like, shape (b,)
+    order : int
+        Highest total order wanted.
 
     Returns
     -------
-    points, du, dv : ndarray, shape (..., a, b, 3)
+    tuple of ndarray, shape (..., a, b, components)
+        Points, then derivatives by u, v, uu, uv, vv and so on.
     """
-    n, m = nets.shape[-3:-1]
-    along_u, along_u_rate = (basis(knots[0], len(knots[0]) - n - 1, u, k) for k in (0, 1))
-    along_v, along_v_rate = (basis(knots[1], len(knots[1]) - m - 1, v, k) for k in (0, 1))
 
-    def products(rows: Floats, columns: Floats, net: Floats) -> Floats:
-        wide = (rows @ net.reshape(*net.shape[:-3], n, -1)).reshape(*net.shape[:-3], len(rows), m, -1)
-        return np.asarray(columns @ wide)
+    def products(along_u: Floats, along_v: Floats, net: Floats) -> Floats:
+        n, m = net.shape[-3:-1]
+        wide = (along_u @ net.reshape(*net.shape[:-3], n, -1)).reshape(*net.shape[:-3], len(along_u), m, -1)
+        return np.asarray(along_v @ wide)
 
-    pairs = ((along_u, along_v), (along_u_rate, along_v), (along_u, along_v_rate))
-    if np.ptp(weights) == 0:
-        points, du, dv = (products(*pair, nets) for pair in pairs)
-        return points, du, dv
-    weight, weight_u, weight_v = (products(*pair, weights[..., np.newaxis]) for pair in pairs)
-    numerator, numerator_u, numerator_v = (products(*pair, nets * weights[..., np.newaxis]) for pair in pairs)
-    points = numerator / weight
-    return points, (numerator_u - weight_u * points) / weight, (numerator_v - weight_v * points) / weight
+    return _derivatives(nets, weights, knots, (u, v), order, products)
 
 
 def grid_points(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike) -> Floats:
-    """Points of many surfaces of one basis on one grid of parameters (A4.3).
+    """Points alone, as of :func:`grid_derivatives` (A4.3); shape (..., a, b, components)."""
+    return grid_derivatives(nets, weights, knots, u, v, 0)[0]
+
+
+def point_derivatives(
+    nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: Floats, v: Floats, order: int = 1
+) -> tuple[Floats, ...]:
+    """Points and derivatives of many surfaces of one basis, of each at places of its own (A4.4).
+
+    Beyond the square the polynomials at its border go on.
 
     Parameters
     ----------
-    nets, weights, knots, u, v
+    nets : ndarray, shape (surfaces, n, m, components)
+    weights, knots, order
         As of :func:`grid_derivatives`.
+    u, v : ndarray, shape (surfaces, q)
 
     Returns
     -------
-    ndarray, shape (..., a, b, 3)
+    tuple of ndarray, shape (surfaces, q, components)
+        Points, then derivatives by u, v, uu, uv, vv and so on.
     """
-    n, m = nets.shape[-3:-1]
-    along_u, along_v = (basis(k, len(k) - count - 1, x) for k, count, x in zip(knots, (n, m), (u, v), strict=True))
-    weighted = nets if np.ptp(weights) == 0 else nets * weights[..., np.newaxis]
-    rows = (along_u @ weighted.reshape(*nets.shape[:-3], n, -1)).reshape(*nets.shape[:-3], len(along_u), m, -1)
-    points = along_v @ rows
-    return np.asarray(points if np.ptp(weights) == 0 else points / (along_u @ weights @ along_v.T)[..., np.newaxis])
+
+    def products(along_u: Floats, along_v: Floats, net: Floats) -> Floats:
+        count, n, m, components = net.shape
+        rows = (along_u @ net.reshape(count, n, m * components)).reshape(*along_u.shape[:2], m, components)
+        return np.asarray(np.einsum("pqjc,pqj->pqc", rows, along_v))
+
+    return _derivatives(nets, weights[np.newaxis], knots, (u, v), order, products)
 
 
-def _homogeneous(control_points: Floats, weights: Floats) -> Floats:
-    return np.concatenate([control_points * weights[..., np.newaxis], weights[..., np.newaxis]], axis=-1)
+def _derivatives(
+    nets: Floats,
+    weights: Floats,
+    knots: tuple[Floats, Floats],
+    places: tuple[ArrayLike, ArrayLike],
+    order: int,
+    products: Callable[[Floats, Floats, Floats], Floats],
+) -> tuple[Floats, ...]:
+    """The same, by what sums the products of functions along u, along v and of control points."""
+    along: list[list[Floats]] = []
+    for k, count, given in zip(knots, weights.shape[-2:], places, strict=True):
+        x = np.asarray(given, float)
+        functions = [basis(k, len(k) - count - 1, x.ravel(), derivative) for derivative in range(order + 1)]
+        along.append([some.reshape(*x.shape, count) for some in functions])
+
+    def summed(net: Floats) -> dict[tuple[int, ...], Floats]:
+        return {(k, m): products(along[0][k], along[1][m], net) for k, m in orders(order, 2)}
+
+    if np.ptp(weights) == 0:
+        return tuple(summed(nets).values())
+    weight = weights[..., np.newaxis]
+    return tuple(quotients(summed(nets * weight), summed(weight)).values())
 
 
-def _quotient(numerator: Floats, order: int) -> Floats:
-    """Derivatives of S from those of (wS, w), by the product rule on wS = w * S."""
-    result = np.zeros((*numerator.shape[:-1], 3))
-    weight = numerator[..., 3:]
-    result[0, 0] = numerator[0, 0, :, :3] / weight[0, 0]
-    if order >= 1:
-        for k, m in ((1, 0), (0, 1)):
-            result[k, m] = (numerator[k, m, :, :3] - weight[k, m] * result[0, 0]) / weight[0, 0]
-    if order >= 2:
-        for k, m in ((2, 0), (0, 2)):
-            mixed = 2 * weight[k // 2, m // 2] * result[k // 2, m // 2] + weight[k, m] * result[0, 0]
-            result[k, m] = (numerator[k, m, :, :3] - mixed) / weight[0, 0]
-        mixed = weight[1, 0] * result[0, 1] + weight[0, 1] * result[1, 0] + weight[1, 1] * result[0, 0]
-        result[1, 1] = (numerator[1, 1, :, :3] - mixed) / weight[0, 0]
-    return result
+def face_integrals(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], *rule: Floats) -> Floats:
+    """Flux of p / 3, area vector and area of many faces of one basis, by quadrature.
+
+    Parameters
+    ----------
+    nets : ndarray, shape (..., n, m, 3)
+    weights, knots
+        As of :func:`grid_derivatives`.
+    *rule : ndarray
+        Places along u, places along v and weights of both, as of :meth:`NurbsSurface.quadrature`.
+
+    Returns
+    -------
+    ndarray, shape (..., 5)
+        Of closed faces together the flux is the volume they enclose.
+    """
+    u, v, both = rule
+    flat, sums = nets.reshape(-1, *nets.shape[-3:]), [np.zeros((0, 5))]
+    for first in range(0, len(flat), _FACES_AT_ONCE):
+        density = face_densities(flat[first : first + _FACES_AT_ONCE], weights, knots, u.ravel(), v.ravel())
+        sums.append(np.einsum("uv,fuvk->fk", both, density))
+    return np.concatenate(sums).reshape(*nets.shape[:-3], 5)
+
+
+def face_densities(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: Floats, v: Floats) -> Floats:
+    """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, u, v, 5)."""
+    points, du, dv = grid_derivatives(nets, weights, knots, u, v)
+    across = np.cross(du, dv)
+    flux = np.sum(points * across, axis=-1, keepdims=True) / 3
+    return np.concatenate([flux, across, np.linalg.norm(across, axis=-1, keepdims=True)], axis=-1)
+
+
+def layer_areas(
+    middle: tuple[Floats, Floats], through: tuple[Floats, Floats], direction: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Coefficients of the area vector of a surface that is moved by s H, along a direction, as a quadratic in s.
+
+    Parameters
+    ----------
+    middle, through : tuple of ndarray, shape (..., 3)
+        Derivatives by u and v of the surface M and of what it is moved by, H.
+    direction : ndarray, shape (..., 3)
+
+    Returns
+    -------
+    constant, linear, square : ndarray, shape (...)
+        Of (M_u + s H_u) x (M_v + s H_v) . direction.
+    """
+    (middle_u, middle_v), (through_u, through_v) = middle, through
+    constant = dot(np.cross(middle_u, middle_v), direction)
+    linear = dot(np.cross(middle_u, through_v) + np.cross(through_u, middle_v), direction)
+    return constant, linear, dot(np.cross(through_u, through_v), direction)
+
+
+def layer_volumes(middle: tuple[Floats, Floats], through: tuple[Floats, Floats], half: Floats) -> Floats:
+    """Volume per du dv between M - H and M + H: the integral of :func:`layer_areas` along H over s from -1 to 1.
+
+    Parameters
+    ----------
+    middle, through
+        As of :func:`layer_areas`.
+    half : ndarray, shape (..., 3)
+        H itself.
+    """
+    constant, _, square = layer_areas(middle, through, half)
+    return 2 * constant + 2 / 3 * square
+
+
+def first_fold(constant: Floats, linear: Floats, square: Floats) -> Floats:
+    """Smallest \\|s\\| at which a layer of :func:`layer_areas` folds over; infinite if none does.
+
+    Zero where the surface itself is turned over, so that no layer is sound.
+    """
+    discriminant = linear * linear - 4 * constant * square
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = 2 * np.abs(constant) / (np.abs(linear) + np.sqrt(discriminant))
+    return np.where(constant <= 0, 0.0, np.where(discriminant < 0, np.inf, root))

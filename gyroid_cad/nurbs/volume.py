@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.nurbs.surface import basis, gauss_points
+from gyroid_cad.nurbs.basis import basis, gauss_points, orders, quotients
 
 __all__ = ["NurbsVolume"]
 
@@ -71,8 +71,7 @@ class NurbsVolume:
         -------
         ndarray, shape (*broadcast, 3)
         """
-        homogeneous, shape = self._homogeneous(u, v, w, ((0, 0, 0),))
-        return np.asarray(homogeneous[0, :, :3] / homogeneous[0, :, 3:]).reshape(*shape, 3)
+        return self._derivatives(u, v, w, 0)[0]
 
     def jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
         """Matrices of first derivatives at triples (u, v, w) (A4.4 with a third parameter).
@@ -87,10 +86,7 @@ class NurbsVolume:
         ndarray, shape (*broadcast, 3, 3)
             ``[..., i, j]`` is the derivative of coordinate i by parameter j.
         """
-        (value, *rates), shape = self._homogeneous(u, v, w, ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
-        points = value[:, :3] / value[:, 3:]
-        columns = [(rate[:, :3] - rate[:, 3:] * points) / value[:, 3:] for rate in rates]
-        return np.stack(columns, axis=-1).reshape(*shape, 3, 3)
+        return np.stack(self._derivatives(u, v, w, 1)[1:], axis=-1)
 
     def jacobian_determinant(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
         """Volume per volume of parameters, negative where the volume is folded over; shape (*broadcast,)."""
@@ -104,28 +100,29 @@ class NurbsVolume:
         determinants = self.jacobian_determinant(u[:, np.newaxis, np.newaxis], v[:, np.newaxis], w)
         return float(np.einsum("uvw,u,v,w->", determinants, along_u, along_v, along_w))
 
-    def _homogeneous(
-        self, u: ArrayLike, v: ArrayLike, w: ArrayLike, orders: tuple[tuple[int, int, int], ...]
-    ) -> tuple[Floats, tuple[int, ...]]:
-        """Derivatives of (weight * point, weight) of these orders, shape (orders, m, 4), and the broadcast shape."""
+    def _derivatives(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, order: int) -> tuple[Floats, ...]:
+        """Points, then derivatives by u, v and w up to an order; shape (*broadcast, 3) each."""
         given = [np.asarray(parameter, float) for parameter in (u, v, w)]
         shape = np.broadcast_shapes(*(parameter.shape for parameter in given))
-        net = np.concatenate(
-            [self.control_points * self.weights[..., np.newaxis], self.weights[..., np.newaxis]], axis=-1
-        )
         subscripts = "ai,bj,ck,ijkd->abcd"
         if not _open_grid(given, shape):
             given = list(np.broadcast_arrays(*given))
             subscripts = "ai,aj,ak,ijkd->ad"
-        functions = [
-            [basis(knots, degree, parameter.ravel(), order) for order in (0, 1)]
+        along = [
+            [basis(knots, degree, parameter.ravel(), derivative) for derivative in range(order + 1)]
             for parameter, knots, degree in zip(given, self.knots, self.degrees, strict=True)
         ]
-        values = [
-            np.einsum(subscripts, *(functions[axis][order[axis]] for axis in range(3)), net, optimize=True)
-            for order in orders
-        ]
-        return np.stack(values).reshape(len(orders), -1, 4), shape
+
+        def summed(net: Floats) -> dict[tuple[int, ...], Floats]:
+            return {
+                each: np.einsum(
+                    subscripts, *(along[axis][derivative] for axis, derivative in enumerate(each)), net, optimize=True
+                ).reshape(*shape, -1)
+                for each in orders(order, 3)
+            }
+
+        weight = self.weights[..., np.newaxis]
+        return tuple(quotients(summed(self.control_points * weight), summed(weight)).values())
 
 
 def _open_grid(given: list[Floats], shape: tuple[int, ...]) -> bool:

@@ -107,7 +107,7 @@ class PrintCheck:
     def passed(self) -> bool:
         """Absence of anything that stands in the way; narrow channels and boundary edges are the user's to judge."""
         sound = self.trapped_voids == 0 and self.open_edges == 0 and self.inside_out == 0
-        return self.fits and self.wall != "too thin" and sound
+        return self.fits and self.wall != "too thin" and sound and self.pieces == 1
 
     def as_dict(self) -> dict[str, Any]:
         """The check as plain values, ready for JSON."""
@@ -177,7 +177,7 @@ class PrintCheck:
     def _whole_rows(self) -> list[tuple[str, str, str]]:
         closed = "closed" if not self.open_edges else f"{self.open_edges:,} open edges"
         turned = f", {self.inside_out} inside out" if self.inside_out else ""
-        pieces = "one piece" if self.pieces == 1 else "prints as separate pieces"
+        pieces = "one piece" if self.pieces == 1 else "falls apart"
         return [
             ("pieces", f"{self.pieces}", pieces),
             ("triangles", f"{self.triangles:,}, {closed}{turned}", "not closed" if self.open_edges else "good"),

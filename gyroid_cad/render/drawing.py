@@ -7,7 +7,8 @@ where neighbouring samples see different things (T. Saito and T. Takahashi, *Com
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,8 @@ _MARGIN = 0.02
 _FINER = 3
 # PNG files of colours in steps too small to be seen are a third smaller; 255 is a multiple of it.
 _COLOUR_STEP = 3
-# Samples in one go, so that large pictures take no more memory than these: about 500 MB.
-_AT_ONCE = 6_000_000
+# Samples, and triangles, in one go: neither large pictures nor many triangles take more memory than about 1 GB.
+_SAMPLES, _TRIANGLES = 8_000_000, 500_000
 # Light from everywhere, from the sky, and from a lamp over the viewer's left shoulder (right, up, towards the viewer).
 _AMBIENT, _SKY, _LAMP = 0.5, 0.18, 0.42
 _DIRECTION = np.array([-0.45, 0.6, 0.66]) / np.linalg.norm([-0.45, 0.6, 0.66])
@@ -46,12 +47,12 @@ _THINNEST = 1e-6
 _NO_LENGTH = float(np.finfo(float).tiny)
 
 
-def draw(facets: Facets, size: tuple[int, int] = SIZE, camera: Vector = CAMERA) -> Bytes:
+def draw(pieces: Sequence[Facets], size: tuple[int, int] = SIZE, camera: Vector = CAMERA) -> Bytes:
     """Draw triangles, seen from afar, as large as the picture lets them be.
 
     Parameters
     ----------
-    facets : Facets
+    pieces : sequence of Facets
     size : tuple of int
         Width and height in pixels.
     camera : tuple of float
@@ -66,27 +67,43 @@ def draw(facets: Facets, size: tuple[int, int] = SIZE, camera: Vector = CAMERA) 
     --------
     >>> from gyroid_cad.render.facets import facets_of_triangles
     >>> square = facets_of_triangles([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], closed=False)
-    >>> image = draw(square, (100, 100), camera=(0, 0, 1))
+    >>> image = draw([square], (100, 100), camera=(0, 0, 1))
     >>> image.shape, int((image[..., 3] == 255).sum())
     ((100, 100, 4), 9216)
     """
-    width, height = (_FINER * length for length in size)
-    scene = _scene(facets, view_axes(camera), width, height)
-    rows = max(_AT_ONCE // (_FINER * width), 1)
-    return np.concatenate([_band(scene, size, top, min(top + rows, size[1])) for top in range(0, size[1], rows)])
+    axes = view_axes(camera)
+    samples = _FINER * np.array(size)
+    low, high = _bounds(pieces, axes)
+    usable = samples - 2 * _MARGIN * samples.min()
+    # A line or a point fills nothing.
+    least = _THINNEST * float(np.max(high - low)) or 1.0
+    scale = float(np.min(usable / np.maximum(high - low, least)[:2]))
+    # To the right, down, and towards the viewer.
+    matrix = axes * np.array([[scale], [-scale], [scale]])
+    offset = np.array([*samples / 2, 0]) - (low + high) / 2 * (scale, -scale, scale)
+    rows = max(_SAMPLES // (_FINER * int(samples[0])), 1)
+    bands = []
+    for top in range(0, size[1], rows):
+        bottom = min(top + rows, size[1])
+        # With a pixel above and below, for the lines that come from there.
+        above, height = _FINER * (top - 1), _FINER * (bottom - top + 2)
+        scene, seen = _visible(pieces, matrix, offset - (0, above, 0), int(samples[0]), height)
+        bands.append(_pixels(scene, seen, int(samples[0]), axes)[1:-1])
+    return np.concatenate(bands)
 
 
-def snug_size(facets: Facets, camera: Vector, longest: int) -> tuple[int, int]:
+def snug_size(pieces: Sequence[Facets], camera: Vector, longest: int) -> tuple[int, int]:
     """Width and height of a picture that triangles just fill, in pixels.
 
     Parameters
     ----------
-    facets : Facets
+    pieces : sequence of Facets
     camera : tuple of float
     longest : int
         The longer of the two.
     """
-    extent = np.ptp((facets.corners @ view_axes(camera)[:2].T).reshape(-1, 2), axis=0)
+    low, high = _bounds(pieces, view_axes(camera))
+    extent = (high - low)[:2]
     usable = longest * (1 - 2 * _MARGIN)
     shorter = usable * float(extent.min()) / (float(extent.max()) or 1.0)
     # The margin is a part of the shorter side.
@@ -103,53 +120,109 @@ class _Scene:
     corners : ndarray, shape (n, 3, 3)
         In samples: to the right, down, and towards the viewer.
     flat : ndarray, shape (n, 3)
-        Unit normals towards the viewer.
+        Unit normals towards the viewer, in the same axes.
+    normals : ndarray, shape (n, 3, 3)
+        At the corners, as they are in space, on the side that is seen.
     colours : ndarray, shape (n, 3, 3)
-        At the corners, lit.
     faces : ndarray of int, shape (n,)
     """
 
     corners: Floats
     flat: Floats
+    normals: Floats
     colours: Floats
     faces: Integers
 
+    def some(self, which: Integers) -> _Scene:
+        return _Scene(*(getattr(self, name)[which] for name in _PARTS))
 
-def _scene(facets: Facets, axes: Floats, width: int, height: int) -> _Scene:
-    seen = facets.corners @ axes.T
-    flat = _unit(np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0]))
-    low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
-    usable = np.array([width, height]) - 2 * _MARGIN * min(width, height)
-    # A line or a point fills nothing.
-    least = _THINNEST * float(np.max(high - low)) or 1.0
-    scale = float(np.min(usable / np.maximum(high - low, least)[:2]))
+
+_PARTS = tuple(field.name for field in fields(_Scene))
+
+
+def _together(scenes: Sequence[_Scene]) -> _Scene:
+    return _Scene(*(np.concatenate([getattr(scene, name) for scene in scenes]) for name in _PARTS))
+
+
+def _bounds(pieces: Sequence[Facets], axes: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates along some axes."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for piece in pieces:
+        points = piece.corners.reshape(-1, 3)
+        for place in piece.places:
+            along = points @ (axes @ place[:, :3]).T + axes @ place[:, 3]
+            low, high = np.minimum(low, along.min(axis=0)), np.maximum(high, along.max(axis=0))
+    return low, high
+
+
+def _visible(
+    pieces: Sequence[Facets], matrix: Floats, offset: Floats, width: int, height: int
+) -> tuple[_Scene, Integers]:
+    """The triangles that are seen, and which of them at each sample.
+
+    Of many only so many at a time are held besides those that were seen so far: memory goes with the picture.
+    """
+    kept: list[_Scene] = []
+    seen = np.full(width * height, NOTHING)
+    for some in _portions(pieces, matrix, offset, height):
+        scene = _together([*kept, some])
+        seen = nearest_triangles(scene.corners, width, height)
+        hit = np.zeros(len(scene.faces) + 1, dtype=bool)
+        hit[seen] = True
+        # The last one, which NOTHING counts as, is no triangle.
+        used = np.flatnonzero(hit[:-1])
+        numbers = np.full(len(hit), NOTHING)
+        numbers[used] = np.arange(len(used))
+        kept, seen = [scene.some(used)], numbers[seen]
+    return kept[0], seen
+
+
+def _portions(pieces: Sequence[Facets], matrix: Floats, offset: Floats, height: int) -> Iterator[_Scene]:
+    """Triangles in their places, so far as they may be seen, not too many at once."""
+    face = 0
+    for piece in pieces:
+        faces = int(piece.faces.max(initial=0)) + 1
+        at_once = max(_TRIANGLES // max(len(piece.faces), 1), 1)
+        for start in range(0, len(piece.places), at_once):
+            parts = []
+            for place in piece.places[start : start + at_once]:
+                parts.append(_placed(piece, matrix @ place[:, :3], matrix @ place[:, 3] + offset, place, face, height))
+                face += faces
+            yield _together(parts)
+
+
+def _placed(piece: Facets, matrix: Floats, offset: Floats, place: Floats, face: int, height: int) -> _Scene:
+    corners = piece.corners @ matrix.T + offset
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # The picture's axes are left-handed: outward normals point away.
+    turned = np.sign(-flat[:, 2])
     # Nobody sees closed surfaces from behind.
-    kept = flat[:, 2] > 0 if facets.closed else flat[:, 2] != 0
-    flat, seen = flat[kept], seen[kept]
-    # Others are lit on the side that is seen.
-    turned = np.where(flat[:, 2] < 0, -1.0, 1.0)[:, np.newaxis]
-    normals = _unit(facets.normals[kept] @ axes.T) * turned[:, np.newaxis]
+    kept = turned > 0 if piece.closed else turned != 0
+    kept &= (corners[..., 1].max(axis=1) > 0) & (corners[..., 1].min(axis=1) < height)
+    side = turned[kept, np.newaxis]
+    return _Scene(
+        corners[kept],
+        _unit(flat[kept]) * -side,
+        (piece.normals[kept] @ place[:, :3].T) * side[:, np.newaxis],
+        piece.colours[kept],
+        piece.faces[kept] + face,
+    )
+
+
+def _pixels(scene: _Scene, seen: Integers, width: int, axes: Floats) -> Bytes:
+    """Samples lit, lined, and averaged to pixels."""
+    normals = _unit(scene.normals) @ axes.T
     light = _AMBIENT + _SKY * (1 + normals[..., 1]) / 2 + _LAMP * np.maximum(dot(normals, _DIRECTION), 0)
-    corners = (seen - (low + high) / 2) * (scale, -scale, scale) + (width / 2, height / 2, 0)
-    return _Scene(corners, flat * turned, facets.colours[kept] * light[..., np.newaxis], facets.faces[kept])
-
-
-def _band(scene: _Scene, size: tuple[int, int], top: int, bottom: int) -> Bytes:
-    """Rows of pixels of a picture, from one to another."""
-    width = _FINER * size[0]
-    # With a pixel above and below, for the lines that come from there.
-    height, above = _FINER * (bottom - top + 2), _FINER * (top - 1)
-    scene = replace(scene, corners=scene.corners - (0, above, 0))
-    seen = nearest_triangles(scene.corners, width, height)
+    lit = slopes(scene.corners, scene.colours * light[..., np.newaxis])
     hit = np.flatnonzero(seen != NOTHING)
     row, column = np.divmod(hit, width)
-    colours = slopes(scene.corners, scene.colours).at(seen[hit], column, row)
-    fine = np.zeros((width * height, 4), dtype=np.float32)
-    fine[hit, :3] = np.clip(colours, 0, 1) * (1 - _ink(scene, seen, hit, width)[hit])[:, np.newaxis]
+    fine = np.zeros((len(seen), 4), dtype=np.float32)
+    ink = _ink(scene, seen, hit, width)[hit]
+    fine[hit, :3] = np.clip(lit.at(seen[hit], column, row), 0, 1) * (1 - ink)[:, np.newaxis]
     fine[hit, 3] = 1
     # Whole rows first, which is quickest.
     rows = fine.reshape(-1, _FINER, 4 * width).sum(axis=1)
-    mean = rows[1:-1].reshape(-1, size[0], _FINER, 4).sum(axis=2) / _FINER**2
+    mean = rows.reshape(len(rows), -1, _FINER, 4).sum(axis=2) / _FINER**2
     # PNG's colours are not multiplied by their opacity.
     mean[..., :3] /= np.maximum(mean[..., 3:], 1 / _FINER**2)
     return np.asarray(np.round(mean * (255 // _COLOUR_STEP)) * _COLOUR_STEP, dtype=np.uint8)

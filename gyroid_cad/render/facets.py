@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,17 +16,18 @@ from gyroid_cad.wall.offset import SIDES, Wall
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["COLOURS", "Facets", "facets_of_shape", "facets_of_triangles", "facets_of_wall", "joined"]
+__all__ = ["COLOURS", "Colour", "Facets", "facets_of_shape", "facets_of_triangles", "facets_of_wall"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Colour = tuple[float, float, float]
 
 # Of a lattice's face B, its face A, and everything else: its rims, the faces of a part.
 COLOURS = ((0.93, 0.71, 0.33), (0.36, 0.58, 0.80), (0.97, 0.90, 0.75))
 REST = 2
 # Squares along each side of a patch: fewer where there are many.
-_MOST_SQUARES, _FEWEST_SQUARES = 10, 3
-_MOST_TRIANGLES = 600_000
+_MOST_SQUARES, _FEWEST_SQUARES = 10, 1
+_MOST_TRIANGLES = 1_200_000
 # Places through the wall, on the side walls.
 _THROUGH = np.linspace(0.0, 1.0, 3)[np.newaxis]
 # Cosine of the angle between triangles from which on their common edge is sharp.
@@ -49,6 +50,8 @@ class Facets:
         Number of the face that each is a part of: a line is drawn where two faces meet.
     closed : bool
         Whether they bound solids, counterclockwise seen from outside: then none is ever seen from behind.
+    places : ndarray, shape (k, 3, 4)
+        Where they are found, once or often: rotation, and translation in mm in the last column.
     """
 
     corners: Floats
@@ -56,6 +59,7 @@ class Facets:
     colours: Floats
     faces: Integers
     closed: bool
+    places: Floats = field(default_factory=lambda: np.eye(3, 4)[np.newaxis])
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -90,7 +94,7 @@ def facets_of_wall(wall: Wall) -> Facets:
     for side in SIDES:
         placed = points[wall.patch_net, side] + shifts[:, np.newaxis, np.newaxis]
         parts.append(_facets_of_grids(placed, normals[wall.patch_net, side], COLOURS[side], backwards=side == 0))
-    return joined([*parts, *_side_walls(wall, samples)])
+    return _joined([*parts, *_side_walls(wall, samples)])
 
 
 def _side_walls(wall: Wall, samples: Floats) -> list[Facets]:
@@ -110,9 +114,7 @@ def _side_walls(wall: Wall, samples: Floats) -> list[Facets]:
     return [_facets_of_grids(placed, normals, COLOURS[REST])]
 
 
-def _facets_of_grids(
-    points: Floats, normals: Floats, colour: tuple[float, float, float], backwards: bool = False
-) -> Facets:
+def _facets_of_grids(points: Floats, normals: Floats, colour: Colour, backwards: bool = False) -> Facets:
     """Triangles of grids, shape (grids, a, b, 3), each a face; turned round if they face inwards."""
     corners = []
     for grid in (points, normals):
@@ -158,8 +160,23 @@ def facets_of_triangles(
     )
 
 
-def facets_of_shape(shape: KernelShape) -> Facets:
+def facets_of_shape(
+    shape: KernelShape,
+    colours: Sequence[Colour | None] | None = None,
+    places: Floats | None = None,
+    extent: float | None = None,
+) -> Facets:
     """Triangles of a shape by the kernel's mesher; faces of a lattice in the two colours of its sides.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    colours : sequence of (float, float, float), optional
+        Of each face, in place of those; none where a face has none of its own.
+    places : ndarray, shape (k, 3, 4), optional
+        Where it is found, if not where it is.
+    extent : float, optional
+        Of all that is drawn, in mm; the diagonal of the shape if left out.
 
     Raises
     ------
@@ -169,14 +186,19 @@ def facets_of_shape(shape: KernelShape) -> Facets:
     from gyroid_cad.kernel.check import topology
     from gyroid_cad.kernel.reading import lattice_sides, shown_triangles
 
-    vertices, triangles, faces = shown_triangles(shape)
-    sides = np.array([REST if side is None else side for side in lattice_sides(shape)])
-    colours = np.array(COLOURS)[sides[faces]]
-    return facets_of_triangles(vertices, triangles, topology(shape).closed, faces, colours)
+    usual = [COLOURS[REST if side is None else side] for side in lattice_sides(shape)]
+    if not usual:
+        # The kernel's mesher refuses to mesh nothing.
+        return facets_of_triangles(np.empty((0, 3)), np.empty((0, 3)), closed=False)
+    vertices, triangles, faces = shown_triangles(shape, extent)
+    own = usual if colours is None else [colour or other for colour, other in zip(colours, usual, strict=True)]
+    by_triangle = np.array(own).reshape(-1, 3)[faces]
+    made = facets_of_triangles(vertices, triangles, topology(shape).closed, faces, by_triangle)
+    return made if places is None else replace(made, places=places)
 
 
-def joined(parts: Sequence[Facets]) -> Facets:
-    """Facets together, each part's faces apart from those of the others."""
+def _joined(parts: Sequence[Facets]) -> Facets:
+    """Facets that stand in the same places, together; each part's faces apart from those of the others."""
     firsts = np.cumsum([0, *(int(part.faces.max(initial=-1)) + 1 for part in parts)])
     return Facets(
         corners=np.concatenate([part.corners for part in parts]),

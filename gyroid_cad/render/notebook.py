@@ -38,7 +38,7 @@ def wall_picture(wall: Wall, size: tuple[int, int], camera: Vector) -> bytes:
     camera : tuple of float
         Direction to the viewer.
     """
-    return png(draw(facets_of_wall(wall), size, camera))
+    return png(draw([facets_of_wall(wall)], size, camera))
 
 
 def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> bytes:
@@ -49,7 +49,7 @@ def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> 
     ExportError
         If the kernel's mesher fails.
     """
-    return png(draw(facets_of_shape(shape), size, camera))
+    return png(draw([facets_of_shape(shape)], size, camera))
 
 
 def mime_bundle(title: str, rows: Callable[[], Sequence[tuple[str, str]]], picture: Callable[[], bytes]) -> MimeBundle:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, freeze_arrays
-from gyroid_cad.nurbs.surface import NurbsSurface, basis
+from gyroid_cad.nurbs.surface import grid_derivatives
 from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["Feet", "WallFaces", "distinct", "settled", "tree_of", "wall_faces"]
@@ -148,7 +148,9 @@ def wall_faces(wall: Wall, period: float | None) -> WallFaces:
         patches = np.unique(wall.patch_net, return_index=True)[1]
     affordable = int(np.sqrt(_MOST_SAMPLES / (len(SIDES) * len(patches))))
     steps = int(np.clip(affordable - 1, _FEWEST_STEPS, _MOST_STEPS))
-    values = _derivatives(wall, wall.nets[wall.patch_net[patches]], np.linspace(-1, 1, steps + 1))
+    nets, along = wall.nets[wall.patch_net[patches]], np.linspace(-1, 1, steps + 1)
+    values = np.stack(grid_derivatives(nets, wall.weights, (wall.knots, wall.knots), along, along, 2))
+    values = values.reshape(6, len(patches), 2, -1, 3)
     shape = values.shape[1:-1]
     points = values[0] + wall.shifts[wall.patch_shift[patches]][:, np.newaxis, np.newaxis]
     side = np.broadcast_to(np.arange(2)[np.newaxis, :, np.newaxis], shape).ravel()
@@ -168,30 +170,6 @@ def tree_of(points: Floats, period: float | None) -> Any:
     from scipy.spatial import cKDTree
 
     return cKDTree(points, boxsize=period)  # type: ignore[arg-type]
-
-
-def _derivatives(wall: Wall, nets: Floats, samples: Floats) -> Floats:
-    """Points, and derivatives by u, v, uu, uv and vv; shape (6, patches, 2, samples squared, 3)."""
-    count = len(samples)
-    orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
-    if np.ptp(wall.weights) > 0:
-        found = np.empty((6, len(nets), 2, count, count, 3))
-        grid = samples[:, np.newaxis], samples[np.newaxis]
-        for patch, side in np.ndindex(len(nets), 2):
-            surface = NurbsSurface(nets[patch, side], wall.weights, wall.knots, wall.knots)
-            every = surface.derivatives(*grid, order=2)
-            for index, order in enumerate(orders):
-                found[index, patch, side] = every[order]
-        return found.reshape(6, len(nets), 2, count**2, 3)
-    functions = [basis(wall.knots, 3, samples, order) for order in range(3)]
-    return np.stack(
-        [
-            np.einsum("ai,bj,psijc->psabc", functions[k], functions[m], nets, optimize=True).reshape(
-                len(nets), 2, count**2, 3
-            )
-            for k, m in orders
-        ]
-    )
 
 
 # Samples of the walls looked at round a centre, which is as near to three walls or more.

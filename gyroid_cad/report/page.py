@@ -127,8 +127,8 @@ def _pictures(facets: Facets | None) -> str:
         return '<section><h2>Pictures</h2><p class="note">There is nothing to be seen.</p></section>'
     figures = []
     for index, (name, camera) in enumerate(VIEWS.items()):
-        width, height = snug_size(facets, camera, _SMALL if index else _LARGE)
-        image = data_uri(png(draw(facets, (width, height), camera)))
+        width, height = snug_size([facets], camera, _SMALL if index else _LARGE)
+        image = data_uri(png(draw([facets], (width, height), camera)))
         figures.append(
             f'<figure><img src="{image}" width="{width}" height="{height}" '
             f'alt="{escape(name)}"><figcaption>{escape(name)}</figcaption></figure>'

@@ -250,9 +250,15 @@ def _trimmed_measures(lattice: Lattice) -> Values:
 
     built = lattice.built()
     found = described(built.solid())
-    exact = lattice.exact_volume if lattice.uniform else None
+    exact = lattice.exact_volume - built.islands.dropped_volume if lattice.uniform else None
     return {
+        "density": built.density,
+        "porosity": 1 - built.density,
         "solids": found.topology.solids,
+        "islands": built.islands.kept,
+        "islands_volume": built.islands.kept_volume,
+        "dropped": built.islands.dropped,
+        "dropped_volume": built.islands.dropped_volume,
         "faces": found.topology.faces,
         "valid": found.valid,
         "closed": found.topology.closed,

@@ -12,7 +12,7 @@ from gyroid_cad.common.arrays import dot, freeze_arrays
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.nurbs.surface import grid_derivatives
 from gyroid_cad.wall.areas import distinct_patches
-from gyroid_cad.wall.exact import differentiation_matrix, offset_patches
+from gyroid_cad.wall.exact import differentiation_matrix, grid_rates, offset_patches
 from gyroid_cad.wall.fitted import FittedWall
 
 __all__ = [
@@ -153,8 +153,7 @@ def wall_thickness(fitted: FittedWall) -> WallThickness:
         outwards = np.cross(faces[1], faces[2])
         met = dot(off, outwards) / dot(outwards, normal[:, np.newaxis])
         middle = exact.points.reshape(*shape, 3)
-        along_u, along_v = np.einsum("ab,pbvc->pavc", rate, middle), np.einsum("ab,pubc->puac", rate, middle)
-        area = np.linalg.norm(np.cross(along_u, along_v), axis=-1) * np.outer(gauss, gauss)
+        area = np.linalg.norm(np.cross(*grid_rates(rate, middle)), axis=-1) * np.outer(gauss, gauss)
         if fitted.spec.trimmed and not grading.uniform:
             size = np.array(fitted.spec.cells) * grading.cell_size
             area = np.where(np.all((middle >= 0) & (middle <= size), axis=-1), area, 0.0)

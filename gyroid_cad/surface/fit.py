@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, gauss_points, uniform_knots
+from gyroid_cad.nurbs.basis import gauss_points, rational_basis, uniform_knots
+from gyroid_cad.nurbs.surface import NurbsSurface, edge_row, first_fold, layer_areas
 from gyroid_cad.surface.patch import (
     EDGE_HALF_TURN,
     PARAMETERISATIONS,
@@ -222,14 +223,8 @@ def max_offset(fitted: FittedPatch) -> float:
     samples = np.linspace(-1, 1, _FOLD_SAMPLES)
     u, v = samples[:, np.newaxis], samples[np.newaxis]
     surface, normals = fitted.surface.derivatives(u, v), fitted.normals.derivatives(u, v)
-    surface_u, surface_v = surface[1, 0], surface[0, 1]
-    n, normals_u, normals_v = normals[0, 0], normals[1, 0], normals[0, 1]
-    a = np.sum(np.cross(surface_u, surface_v) * n, axis=-1)
-    b = np.sum((np.cross(surface_u, normals_v) + np.cross(normals_u, surface_v)) * n, axis=-1)
-    c = np.sum(np.cross(normals_u, normals_v) * n, axis=-1)
-    # c < 0 < a on a saddle: one root on each side, the nearer one at this distance.
-    roots = 2 * a / (np.abs(b) + np.sqrt(np.maximum(b * b - 4 * a * c, 0)))
-    return float(roots.min())
+    middle, through = ((d[1, 0], d[0, 1]) for d in (surface, normals))
+    return float(first_fold(*layer_areas(middle, through, normals[0, 0])).min())
 
 
 def require_shared_edges(fitted: FittedPatch) -> None:
@@ -267,21 +262,20 @@ def _fit_staged(settings: FitSettings, family: Family) -> Floats:
     n, knots, weights = settings.control_points, settings.knot_vector(), settings.weight_net()
     exact = partial(PARAMETERISATIONS[settings.parameterisation], family=family)
     samples, sample_weights = gauss_points(knots, _SAMPLES_PER_SPAN)
-    functions = basis(knots, DEGREE, samples)
     net = np.zeros((n, n, 6))
     for k, (u, v) in enumerate(parameter_corners()):
         edge_row(net, k)[0] = np.concatenate(exact(u, v), axis=-1)
     ones = np.ones_like(samples)
     square = ((samples, -ones), (ones, samples), (-samples, ones), (-ones, -samples))
     for k, (u, v) in enumerate(square):
-        rational = functions * edge_row(weights, k)
-        rational /= rational.sum(axis=1, keepdims=True)
+        rational = rational_basis(edge_row(weights, k), (knots,), samples[:, np.newaxis])[0]
         row = edge_row(net, k)
         known = rational[:, [0, -1]] @ row[[0, -1]]
         row[1:-1] = _least_squares(rational[:, 1:-1], np.concatenate(exact(u, v), axis=-1) - known, sample_weights)
     inner = np.zeros((n, n), dtype=bool)
     inner[1:-1, 1:-1] = True
-    rational = _rational_rows(functions, functions, weights)
+    places = np.stack(np.meshgrid(samples, samples, indexing="ij"), axis=-1).reshape(-1, 2)
+    rational = rational_basis(weights, (knots, knots), places)[0]
     known = rational[:, ~inner.ravel()] @ net[~inner]
     u, v = samples[:, np.newaxis], samples[np.newaxis]
     wanted = np.concatenate(exact(u, v), axis=-1).reshape(-1, 6) - known
@@ -316,17 +310,9 @@ def _fit_cloud(settings: FitSettings, family: Family) -> Floats:
     border_v = np.concatenate([-ones, along, ones, -along])
     u = np.append(np.outer(radius, border_u).ravel(), 0.0)
     v = np.append(np.outer(radius, border_v).ravel(), 0.0)
-    products = basis(knots, DEGREE, u)[:, :, np.newaxis] * basis(knots, DEGREE, v)[:, np.newaxis, :]
-    rational = (products * settings.weight_net()).reshape(len(u), n * n)
-    rational /= rational.sum(axis=1, keepdims=True)
+    rational = rational_basis(settings.weight_net(), (knots, knots), np.stack([u, v], axis=-1))[0]
     samples = np.concatenate(PARAMETERISATIONS[settings.parameterisation](u, v, family), axis=-1)
     return _least_squares(rational, samples, np.ones(len(u))).reshape(n, n, 6)
-
-
-def _rational_rows(along_u: Floats, along_v: Floats, weights: Floats) -> Floats:
-    """R of eq. (11) on a grid of samples, by eq. (9); shape (len(u) * len(v), n * n)."""
-    rows = np.einsum("ai,bj,ij->abij", along_u, along_v, weights).reshape(len(along_u) * len(along_v), -1)
-    return np.asarray(rows / rows.sum(axis=1, keepdims=True))
 
 
 def _least_squares(rows: Floats, wanted: Floats, sample_weights: Floats) -> Floats:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.roots import roots
-from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.nurbs.surface import point_derivatives
 
 __all__ = ["AXES", "PLANES", "EdgeCrossings", "FacesToCut", "edge_crossings", "plane_heights", "square_points"]
 
@@ -71,28 +71,12 @@ class FacesToCut:
         -------
         points, du, dv : ndarray, shape (m, q, 3)
         """
-        along_u, along_v = ([self._functions(x, k) for k in (0, 1)] for x in (u, v))
-        homogeneous = self._homogeneous(which)
-        point, du, dv = (
-            _products(homogeneous, *pair)
-            for pair in ((along_u[0], along_v[0]), (along_u[1], along_v[0]), (along_u[0], along_v[1]))
-        )
-        weight = point[..., 3:]
-        place = point[..., :3] / weight
-        return place, (du[..., :3] - du[..., 3:] * place) / weight, (dv[..., :3] - dv[..., 3:] * place) / weight
+        place, du, dv = point_derivatives(self.nets[which], self.weights, (self.knots, self.knots), u, v)
+        return place, du, dv
 
     def points(self, which: Integers, u: Floats, v: Floats) -> Floats:
         """Points of chosen faces alone; shape (m, q, 3)."""
-        point = _products(self._homogeneous(which), self._functions(u, 0), self._functions(v, 0))
-        return np.asarray(point[..., :3] / point[..., 3:])
-
-    def _homogeneous(self, which: Integers) -> Floats:
-        weights = self.weights[..., np.newaxis]
-        nets = self.nets[which]
-        return np.concatenate([nets * weights, np.broadcast_to(weights, (*nets.shape[:3], 1))], axis=-1)
-
-    def _functions(self, x: Floats, derivative: int) -> Floats:
-        return basis(self.knots, 3, x.ravel(), derivative).reshape(*x.shape, len(self.weights))
+        return point_derivatives(self.nets[which], self.weights, (self.knots, self.knots), u, v, 0)[0]
 
     def heights(self, which: Integers, u: Floats, v: Floats) -> Floats:
         """Height of points over every plane, on its kept side, in mm; shape (m, q, 6), infinite for planes not near."""
@@ -124,13 +108,6 @@ class EdgeCrossings:
     def places(self) -> Floats:
         """Places of the crossings in the square; shape (crossings, 2)."""
         return np.stack(square_points(self.side, self.along), axis=-1)
-
-
-def _products(nets: Floats, along_u: Floats, along_v: Floats) -> Floats:
-    """Sums over nets (m, n, n, 4) of functions (m, q, n) along u and v; shape (m, q, 4)."""
-    count, n = nets.shape[:2]
-    rows = (along_u @ nets.reshape(count, n, n * 4)).reshape(*along_u.shape[:2], n, 4)
-    return np.asarray(np.einsum("mqjc,mqj->mqc", rows, along_v))
 
 
 def square_points(side: Integers | int, along: Floats) -> tuple[Floats, Floats]:

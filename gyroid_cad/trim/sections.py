@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.nurbs.surface import basis
+from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, FacesToCut, plane_heights
 
 __all__ = ["Sections", "plane_sections", "section_knots"]
@@ -126,9 +127,9 @@ def plane_sections(faces: FacesToCut, crossings: EdgeCrossings, size: float) -> 
 def _require_open_curves(faces: FacesToCut) -> None:
     """Wherever a face lies above a plane, or below, one can go on doing so to a side of the square."""
     face, plane = np.nonzero(~np.isnan(faces.levels))
-    through = basis(faces.knots, 3, np.linspace(-1, 1, _GRID))
-    heights = faces.nets[face, ..., AXES[plane]] - faces.levels[face, plane][:, np.newaxis, np.newaxis]
-    above = through @ (faces.weights * heights) @ through.T > 0
+    coordinates, along = faces.nets[face, ..., AXES[plane]][..., np.newaxis], np.linspace(-1, 1, _GRID)
+    points = grid_points(coordinates, faces.weights, (faces.knots, faces.knots), along, along)[..., 0]
+    above = points > faces.levels[face, plane][:, np.newaxis, np.newaxis]
     reached = np.ones_like(above)
     reached[:, 1:-1, 1:-1] = False
     along_u, along_v = above[:, 1:] == above[:, :-1], above[:, :, 1:] == above[:, :, :-1]

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.nurbs.roots import roots
-from gyroid_cad.nurbs.surface import gauss_points
 from gyroid_cad.trim.edge_crossings import PLANES, EdgeCrossings, FacesToCut, edge_crossings, square_points
 from gyroid_cad.trim.loops import linked, nested
 from gyroid_cad.trim.sections import Sections, plane_sections

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.nurbs.surface import gauss_points, grid_derivatives
+from gyroid_cad.nurbs.basis import gauss_points
+from gyroid_cad.nurbs.surface import face_integrals, grid_derivatives
 from gyroid_cad.wall.complex import CellComplex
-from gyroid_cad.wall.exact import differentiation_matrix, offset_patches
+from gyroid_cad.wall.exact import differentiation_matrix, grid_rates, offset_patches
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import SIDES, Wall
 
@@ -63,15 +64,10 @@ def fitted_areas(wall: Wall) -> WallAreas:
     -------
     WallAreas
     """
-    u, v, weights = wall.face(0, 0).quadrature()
     uses = np.bincount(wall.patch_net, minlength=len(wall.nets))
-    totals = np.zeros(2)
-    for first in range(0, len(wall.nets), _NETS_AT_ONCE):
-        some = slice(first, first + _NETS_AT_ONCE)
-        _, du, dv = grid_derivatives(wall.nets[some], wall.weights, (wall.knots, wall.knots), u.ravel(), v.ravel())
-        area = np.linalg.norm(np.cross(du, dv), axis=-1)
-        totals += np.einsum("p,uv,psuv->s", uses[some], weights, area)
-    return WallAreas(face_a=float(totals[1]), face_b=float(totals[0]), rim=_rim_area(wall))
+    rule = wall.face(0, 0).quadrature()
+    face_b, face_a = (uses @ face_integrals(wall.nets, wall.weights, (wall.knots, wall.knots), *rule)[..., 4]).tolist()
+    return WallAreas(face_a=face_a, face_b=face_b, rim=_rim_area(wall))
 
 
 def exact_areas(complex: CellComplex, grading: Grading, patches: Integers, uses: Integers) -> WallAreas:
@@ -96,8 +92,7 @@ def exact_areas(complex: CellComplex, grading: Grading, patches: Integers, uses:
         offset = exact.normals * (exact.thickness / 2)[:, np.newaxis]
         for side in SIDES:
             face = (exact.points + (2 * side - 1) * offset).reshape(shape)
-            along_u, along_v = np.einsum("ab,pbvc->pavc", rate, face), np.einsum("ab,pubc->puac", rate, face)
-            area = np.linalg.norm(np.cross(along_u, along_v), axis=-1)
+            area = np.linalg.norm(np.cross(*grid_rates(rate, face)), axis=-1)
             totals[side] += float(np.einsum("p,u,v,puv->", uses[some], weights, weights, area))
     return WallAreas(face_a=float(totals[1]), face_b=float(totals[0]))
 

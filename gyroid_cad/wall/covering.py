@@ -6,17 +6,19 @@ their edges, and each such group is all inside or all outside: one point tells.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.graph import connected
+from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.exact import offset_patches, patch_points, patch_points_and_normals
+from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 
 __all__ = [
@@ -28,16 +30,18 @@ __all__ = [
     "SIDE_SAMPLES",
     "Frame",
     "covering_complex",
+    "first_success",
     "nearest_offsets",
     "patch_sides",
     "periodic_offsets",
-    "sides_of_points",
     "wall_extremes",
 ]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
+
+T = TypeVar("T")
 
 OUTSIDE, CROSSING, INSIDE = -1, 0, 1
 # Along each side of a patch, whose middle is among them.
@@ -72,6 +76,28 @@ class Frame:
 
 
 AT_HOME = Frame(np.zeros(3), np.eye(3))
+
+
+def first_success(attempts: Iterable[Callable[[], T]]) -> T:
+    """Return the result of the first attempt at a cut in which the kernel does not fail.
+
+    Parameters
+    ----------
+    attempts : iterable of callable
+        Without arguments: a cut with the lattice as it stands, and with it shifted by :data:`PERTURBATIONS`.
+
+    Raises
+    ------
+    KernelError
+        That of the first attempt, if all fail.
+    """
+    problem: KernelError | None = None
+    for attempt in attempts:
+        try:
+            return attempt()
+        except KernelError as failed:
+            problem = problem or failed
+    raise KernelError(f"{problem}; nor with the lattice shifted a little, twice")
 
 
 def covering_complex(
@@ -124,8 +150,7 @@ def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> 
 
 def patch_sides(
     complex: CellComplex,
-    frame: Frame,
-    cell_size: float,
+    points: Floats,
     reach: float,
     distance: Callable[[Floats], Floats],
     contains: Callable[[Floats], Booleans],
@@ -135,36 +160,14 @@ def patch_sides(
     Parameters
     ----------
     complex : CellComplex
-    frame : Frame
-    cell_size, reach : float
+    points : ndarray, shape (patches, :data:`SIDE_SAMPLES` squared, 3)
+        Of the mid-surface, on a grid, in mm, in the part's space.
+    reach : float
         In mm.
     distance : callable
         Of points (n, 3) in the part's space: no more than their distance from its boundary, in mm.
     contains : callable
         Which of some points lie inside the part.
-    """
-    points = frame.placed(patch_points(complex, cell_size, np.linspace(-1, 1, SIDE_SAMPLES)))
-    return sides_of_points(complex, points, reach, distance, contains)
-
-
-def sides_of_points(
-    complex: CellComplex,
-    points: Floats,
-    reach: float,
-    distance: Callable[[Floats], Floats],
-    contains: Callable[[Floats], Booleans],
-) -> Integers:
-    """Sort patches, wherever they lie, as :func:`patch_sides` does; shape (patches,).
-
-    Parameters
-    ----------
-    complex : CellComplex
-    points : ndarray, shape (patches, :data:`SIDE_SAMPLES` squared, 3)
-        Of the mid-surface, on a grid, in mm.
-    reach : float
-        In mm.
-    distance, contains : callable
-        As of :func:`patch_sides`.
     """
     # Every place of a patch is within half a step between samples, along both sides, of one of them.
     grid = points.reshape(-1, SIDE_SAMPLES, SIDE_SAMPLES, 3)

@@ -9,8 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.nurbs.surface import layer_volumes
 from gyroid_cad.surface.patch import PARAMETERISATIONS
-from gyroid_cad.surface.symmetry import QUARTER
+from gyroid_cad.surface.symmetry import QUARTER, Placements
 from gyroid_cad.surface.weierstrass import Family
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.grading import Grading, WallPoints
@@ -20,9 +21,9 @@ __all__ = [
     "block_volume",
     "differentiation_matrix",
     "exact_measures",
+    "grid_rates",
     "interpolation_matrix",
     "offset_patches",
-    "patch_points",
     "patch_points_and_normals",
     "sampled_point",
 ]
@@ -54,43 +55,52 @@ def offset_patches(
     ------
     slice
         Of ``patches``.
-    Laid
+    WallPoints
         At patches x m x m points; du x dv along the normal.
     """
     patches = np.arange(complex.patch_count) if patches is None else patches
-    points, normals = _placed_grid(complex, grading.cell_size, samples)
     for first in range(0, len(patches), _PATCHES_AT_ONCE):
         some = slice(first, first + _PATCHES_AT_ONCE)
-        placement, corner = complex.patch_placement[patches[some]], complex.patch_cell[patches[some]]
-        places = points[placement] + (corner * grading.cell_size)[:, np.newaxis]
-        yield some, grading.lay(places.reshape(-1, 3), normals[placement].reshape(-1, 3))
+        points, normals = patch_points_and_normals(complex, grading.cell_size, samples, patches[some])
+        yield some, grading.lay(points.reshape(-1, 3), normals.reshape(-1, 3))
 
 
-def patch_points(complex: CellComplex, cell_size: float, samples: Floats) -> Floats:
-    """Points of every patch before any map, in mm; shape (patches, m * m, 3) for m samples along each side."""
-    return patch_points_and_normals(complex, cell_size, samples)[0]
+def patch_points_and_normals(
+    complex: CellComplex, cell_size: float, samples: Floats, patches: Integers | slice = slice(None)
+) -> tuple[Floats, Floats]:
+    """Points of patches before any map, in mm, and the unit normals on the common side.
 
+    Parameters
+    ----------
+    complex : CellComplex
+    cell_size : float
+        In mm.
+    samples : ndarray, shape (m,)
+        Along each side of a patch.
+    patches : ndarray of int, or slice
+        Which patches; all if left out.
 
-def patch_points_and_normals(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
-    """Points of patches, and the unit normals on the common side, of the same shape."""
-    points, normals = _placed_grid(complex, cell_size, samples)
-    corners = (complex.patch_cell * cell_size)[:, np.newaxis]
-    return points[complex.patch_placement] + corners, normals[complex.patch_placement]
+    Returns
+    -------
+    points, normals : ndarray, shape (patches, m * m, 3)
+    """
+    points, normals = _placed_grid(complex.placements, cell_size, tuple(samples.tolist()))
+    placement, corner = complex.patch_placement[patches], complex.patch_cell[patches] * cell_size
+    return points[placement] + corner[:, np.newaxis], normals[placement]
 
 
 def sampled_point(
     complex: CellComplex, cell_size: float, samples: Floats, patch: int, index: int
 ) -> tuple[float, float, float]:
-    """Place, in mm and before any map, of a patch's sample that has a flat index in its grid."""
-    points, _ = _placed_grid(complex, cell_size, samples)
-    x, y, z = points[complex.patch_placement[patch], index] + complex.patch_cell[patch] * cell_size
-    return float(x), float(y), float(z)
+    """Place, in mm and before any map, of the sample of a patch that has a flat index in its grid."""
+    x, y, z = patch_points_and_normals(complex, cell_size, samples, np.array([patch]))[0][0, index].tolist()
+    return x, y, z
 
 
-def _placed_grid(complex: CellComplex, cell_size: float, samples: Floats) -> tuple[Floats, Floats]:
+@lru_cache(maxsize=16)
+def _placed_grid(placements: Placements, cell_size: float, samples: tuple[float, ...]) -> tuple[Floats, Floats]:
     """Points in mm and unit normals of the first cell's patches; shape (placements, m * m, 3) each."""
-    placements = complex.placements
-    points, normals = _exact_grid(tuple(samples.tolist()), placements.patch.family)
+    points, normals = _exact_grid(samples, placements.patch.family)
     turns = np.swapaxes(placements.matrices, 1, 2).astype(float)
     places = points @ turns + (placements.translations * QUARTER)[:, np.newaxis]
     return places * (cell_size / 2), normals @ (turns * placements.sides[:, np.newaxis, np.newaxis])
@@ -144,11 +154,9 @@ def exact_measures(complex: CellComplex, grading: Grading) -> ExactMeasures:
         shape = (-1, len(nodes), len(nodes), 3)
         middle = fitted.points.reshape(shape)
         half = (fitted.normals * (fitted.thickness / 2)[:, np.newaxis]).reshape(shape)
-        middle_u, half_u = (np.einsum("ab,pbvc->pavc", rate, a) for a in (middle, half))
-        middle_v, half_v = (np.einsum("ab,pubc->puac", rate, a) for a in (middle, half))
-        # The integral over s from -1 to 1 of (M_u + s H_u) x (M_v + s H_v) . H.
-        flat = np.cross(middle_u, middle_v)
-        volumes = np.einsum("puvc,puvc->puv", 2 * flat + 2 / 3 * np.cross(half_u, half_v), half)
+        along = grid_rates(rate, middle)
+        volumes = layer_volumes(along, grid_rates(rate, half), half)
+        flat = np.cross(*along)
         areas = np.linalg.norm(flat, axis=-1)
         integrands = np.stack([volumes, areas, areas * fitted.thickness.reshape(areas.shape)])
         totals += np.einsum("u,v,ipuv->i", weights, weights, integrands)
@@ -202,6 +210,22 @@ def differentiation_matrix(nodes: Floats) -> Floats:
     np.fill_diagonal(matrix, 0.0)
     np.fill_diagonal(matrix, -matrix.sum(axis=1))
     return np.asarray(matrix)
+
+
+def grid_rates(matrix: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Derivatives along u and v of what is sampled at the nodes of a grid.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (m, m)
+        Of :func:`differentiation_matrix`.
+    values : ndarray, shape (patches, m, m, components)
+
+    Returns
+    -------
+    along_u, along_v : ndarray, shape (patches, m, m, components)
+    """
+    return np.einsum("ab,pbvc->pavc", matrix, values), np.einsum("ab,pubc->puac", matrix, values)
 
 
 def interpolation_matrix(nodes: Floats, places: Floats) -> Floats:

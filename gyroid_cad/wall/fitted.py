@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +99,8 @@ class LatticeSpec:
         Largest deviation of a graded wall, in cell sizes; one that does not is fitted as the settings say.
     trimmed : bool
         Whether it is cut to the block of cells.
+    keep_islands : bool
+        Whether pieces that the cut leaves unconnected are kept however small.
     """
 
     cells: tuple[int, int, int]
@@ -106,6 +108,7 @@ class LatticeSpec:
     settings: FitSettings
     tolerance: float
     trimmed: bool = False
+    keep_islands: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +199,9 @@ _fitted: Cache[LatticeSpec, FittedWall] = Cache()
 
 def fitted_wall(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
     """Fit and check the wall of a lattice, as :func:`fit_spec` does; the last few are cached."""
-    return _fitted.get(spec, lambda: fit_spec(spec, progress))
+    # What becomes of pieces is for the solid to know: the wall is the same.
+    alike = replace(spec, keep_islands=False)
+    return replace(_fitted.get(alike, lambda: fit_spec(alike, progress)), spec=spec)
 
 
 def _complex(spec: LatticeSpec) -> CellComplex:

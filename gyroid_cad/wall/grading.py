@@ -103,7 +103,7 @@ class Grading:
 
         Returns
         -------
-        Laid
+        WallPoints
 
         Raises
         ------

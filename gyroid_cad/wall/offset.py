@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, grid_derivatives
+from gyroid_cad.nurbs.surface import NurbsSurface, edge_row, grid_derivatives, layer_volumes
 from gyroid_cad.surface.fit import FittedPatch, max_offset, require_shared_edges
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex
@@ -172,9 +172,7 @@ def _volumes(nets: Floats, like: NurbsSurface) -> Floats:
     below, above = np.moveaxis(nets, 1, 0)
     _, middle_u, middle_v = grid_derivatives((above + below) / 2, like.weights, knots, u.ravel(), v.ravel())
     half, half_u, half_v = grid_derivatives((above - below) / 2, like.weights, knots, u.ravel(), v.ravel())
-    # The integral over s from -1 to 1 of (M_u + s H_u) x (M_v + s H_v) . H.
-    area = 2 * np.cross(middle_u, middle_v) + 2 / 3 * np.cross(half_u, half_v)
-    return np.asarray(np.einsum("uv,puvc,puvc->p", weights, area, half))
+    return np.asarray(np.einsum("uv,puv->p", weights, layer_volumes((middle_u, middle_v), (half_u, half_v), half)))
 
 
 def _extreme(surface: NurbsSurface, axis: int, towards: int, samples: int = 25, rounds: int = 4) -> float:
@@ -183,14 +181,7 @@ def _extreme(surface: NurbsSurface, axis: int, towards: int, samples: int = 25, 
     reach = 1.0
     for _ in range(rounds):
         u, v = (np.clip(centre + reach * np.linspace(-1, 1, samples), -1, 1) for centre in (centre_u, centre_v))
-        values = _grid_coordinate(surface, u, v, axis)
+        values = surface.evaluate(u[:, np.newaxis], v[np.newaxis])[..., axis]
         i, j = np.unravel_index(np.argmin(towards * values), values.shape)
         centre_u, centre_v, reach, best = float(u[i]), float(v[j]), reach * 3 / samples, float(values[i, j])
     return best
-
-
-def _grid_coordinate(surface: NurbsSurface, u: Floats, v: Floats, axis: int) -> Floats:
-    along_u = basis(surface.knots_u, surface.degree_u, u)
-    along_v = basis(surface.knots_v, surface.degree_v, v)
-    denominator = along_u @ surface.weights @ along_v.T
-    return np.asarray(along_u @ (surface.weights * surface.control_points[..., axis]) @ along_v.T / denominator)

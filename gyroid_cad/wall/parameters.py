@@ -60,6 +60,7 @@ class LatticeParameters:
     tolerance: float | None = None
     trim: Trim | None = None
     surface: SurfaceName = "gyroid"
+    keep_islands: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -166,7 +167,8 @@ class LatticeParameters:
         if self.uniform and self.tolerance is not None:
             settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
         tolerance = self.tolerance or USUAL_TOLERANCE
-        return LatticeSpec(self.cells, self.grading(), settings, tolerance, self.trim is not None)
+        trimmed = self.trim is not None
+        return LatticeSpec(self.cells, self.grading(), settings, tolerance, trimmed, self.keep_islands)
 
     def grading(self) -> Grading:
         """Return how wall and space vary, or that they do not."""
@@ -198,6 +200,8 @@ class LatticeParameters:
     def _require_trim(self) -> None:
         if self.trim is not None and self.trim not in TRIMS:
             raise ParameterError("trim", self.trim, f"{' or '.join(TRIMS)}, or none for whole patches")
+        if self.keep_islands and not self.trim:
+            raise ParameterError("keep_islands", True, "a lattice that is trimmed: whole patches leave no islands")
         if self.trim and (self.scale_field is not None or self.map is not None):
             raise ParameterError("trim", self.trim, "none where a map or a scale field carries the block elsewhere")
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.surface import basis, edge_row, grid_derivatives, uniform_knots
+from gyroid_cad.nurbs.basis import basis, uniform_knots
+from gyroid_cad.nurbs.surface import edge_row, grid_derivatives
 from gyroid_cad.surface.fit import DEGREE, MOST_CONTROL_POINTS, more_control_points
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.exact import offset_patches

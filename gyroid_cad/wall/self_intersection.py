@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import given_as
-from gyroid_cad.nurbs.surface import grid_derivatives
+from gyroid_cad.nurbs.surface import first_fold, grid_derivatives, layer_areas
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.exact import differentiation_matrix, interpolation_matrix, offset_patches, sampled_point
 from gyroid_cad.wall.grading import Grading
@@ -124,7 +124,7 @@ def _exact_fold_factor(nodes: Floats, places: Floats, middle: Floats, normal: Fl
     middle_u, normal_u = (at_places(slope, values, a) for a in (middle, normal))
     middle_v, normal_v = (at_places(values, slope, a) for a in (middle, normal))
     through = at_places(values, values, normal)
-    return _fold_factor(through, middle_u, half * normal_u, middle_v, half * normal_v)
+    return first_fold(*layer_areas((middle_u, middle_v), (half * normal_u, half * normal_v), through))
 
 
 def require_simple_fit(wall: Wall, grading: Grading) -> None:
@@ -160,7 +160,7 @@ def _fitted_fold_factor(wall: Wall, some: slice, samples: Floats) -> Floats:
     below, above = np.moveaxis(wall.nets[some], 1, 0)
     _, middle_u, middle_v = grid_derivatives((above + below) / 2, wall.weights, knots, samples, samples)
     half, half_u, half_v = grid_derivatives((above - below) / 2, wall.weights, knots, samples, samples)
-    return _fold_factor(half, middle_u, half_u, middle_v, half_v).reshape(len(below), -1)
+    return first_fold(*layer_areas((middle_u, middle_v), (half_u, half_v), half)).reshape(len(below), -1)
 
 
 def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats) -> list[_Worst]:
@@ -273,18 +273,6 @@ class _Lookup:
         corners = (self.corners[self.patch[samples]] for samples in (first, second))
         one, other = corners
         return np.asarray((one[:, :, np.newaxis] == other[:, np.newaxis, :]).any(axis=(1, 2)))
-
-
-def _fold_factor(through: Floats, middle_u: Floats, half_u: Floats, middle_v: Floats, half_v: Floats) -> Floats:
-    """Smallest |s| at which the area vector (M_u + s H_u) x (M_v + s H_v) has no part through the wall; inf if none."""
-    constant = dot(np.cross(middle_u, middle_v), through)
-    linear = dot(np.cross(middle_u, half_v) + np.cross(half_u, middle_v), through)
-    square = dot(np.cross(half_u, half_v), through)
-    discriminant = linear * linear - 4 * constant * square
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = 2 * np.abs(constant) / (np.abs(linear) + np.sqrt(discriminant))
-    # Where the mid-surface is inside out no thickness is sound.
-    return np.where(constant <= 0, 0.0, np.where(discriminant < 0, np.inf, root))
 
 
 def _meeting_factor(apart: Floats, half: Floats, other_reach: Floats) -> Floats:

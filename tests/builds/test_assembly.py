@@ -271,7 +271,7 @@ def test_an_invalid_cell_is_not_written(lattice: Lattice, tmp_path: Path, monkey
     made = lattice.assembly()
     monkeypatch.setattr(made.cell, "_valid", False)
     with pytest.raises(KernelError, match="invalid; nothing was written"):
-        made.write([tmp_path / "part.step"])
+        made.write(tmp_path / "part.step")
     assert not list(tmp_path.iterdir())
 
 
@@ -279,5 +279,5 @@ def test_more_instances_than_memory_holds_are_refused(tmp_path: Path, monkeypatc
     made = Lattice((10, 10, 10), SIZE, 0.8, fit=COARSE).assembly()
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=memory._BASE_BYTES + 2_000_000))
     with pytest.raises(ParameterError, match=r"cells = \(10, 10, 10\): expected at most about 200 cells"):
-        made.write([tmp_path / "part.step"])
+        made.write(tmp_path / "part.step")
     assert not list(tmp_path.iterdir())

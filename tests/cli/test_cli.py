@@ -30,8 +30,8 @@ Captured = pytest.CaptureFixture[str]
 
 KEYS = [
     *("cells", "cell_size", "cells_alike", "thickness", "min_thickness", "max_thickness", "density"),
-    *("patches", "faces", "solids", "control_points", "valid", "closed"),
-    *("boundary_edges", "non_manifold_edges", "volume", "volume_exact", "area"),
+    *("patches", "faces", "solids", "islands", "islands_volume", "dropped", "dropped_volume"),
+    *("control_points", "valid", "closed", "boundary_edges", "non_manifold_edges", "volume", "volume_exact", "area"),
     *("max_deviation", "max_wall_error", "max_normal_angle", "samples_per_patch", "seconds", "files"),
 ]
 ONE_CELL = ["--cells", "1", "1", "1", "--cell-size", "10"]
@@ -49,6 +49,22 @@ def in_process(captured: Captured, *arguments: str | Path) -> SimpleNamespace:
 def as_a_program(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "gyroid_cad", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "solids", "row"), [([], 1, "0 left, 2 dropped"), (["--keep-islands"], 3, "2 left")]
+)
+def test_chips_of_a_trimmed_lattice_are_in_the_table_and_the_json_and_stderr_is_silent(
+    capsys: Captured, tmp_path: Path, options: list[str], solids: int, row: str
+) -> None:
+    trimmed = ["build", "-o", tmp_path / "a.brep", *ONE_CELL, *WALL, *COARSE, "--trim", "box", *options]
+    shown, told = in_process(capsys, *trimmed), in_process(capsys, *trimmed, "--json")
+    assert (shown.status, shown.err, told.err) == (0, "", "")
+    assert row in shown.out
+    summary = json.loads(told.out)
+    assert summary["solids"] == solids == 1 + summary["islands"]
+    assert summary["islands"] + summary["dropped"] == 2
+    assert summary["islands_volume"] + summary["dropped_volume"] == pytest.approx(0.113, abs=0.005)
 
 
 @pytest.fixture(scope="module")

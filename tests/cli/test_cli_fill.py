@@ -13,6 +13,8 @@ from gyroid_cad.cli.app import main
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
+from gyroid_cad.mesh.triangles.files import read_triangles
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 
 Captured = pytest.CaptureFixture[str]
 
@@ -53,6 +55,29 @@ def test_the_table_shows_what_it_weighs_before_and_after(capsys: Captured, peg: 
     assert done.status == 0
     assert "islands" in done.out
     assert " g of " in done.out
+
+
+@pytest.mark.parametrize("kind", ["sheet", "network-a", "network-b", "channels"])
+def test_every_kind_takes_a_density_from_the_command_line(capsys: Captured, block: Path, kind: str) -> None:
+    done = run(capsys, block, "-o", block.with_name("a.brep"), *FILL, "--density", "0.3", "--kind", kind, "--json")
+    assert done.status == 0, done.err
+    assert json.loads(done.out)["kind"] == kind
+
+
+@pytest.mark.parametrize(
+    ("options", "solids", "islands", "dropped"),
+    [([], 1, 0, 2), (["--keep-islands"], 3, 2, 0), (["--drop-islands"], 1, 0, 2)],
+)
+def test_small_islands_are_dropped_unless_they_are_to_be_kept(
+    capsys: Captured, tmp_path: Path, options: list[str], solids: int, islands: int, dropped: int
+) -> None:
+    write_step(cq.Workplane().box(10, 10, 10, centered=False).val().wrapped, tmp_path / "cell.step")
+    arguments = [tmp_path / "cell.step", "-o", tmp_path / "a.stl", *FILL, "--density", "0.2", "--deviation", "0.1"]
+    done = run(capsys, *arguments, *options, "--json")
+    assert (done.status, done.err) == (0, "")
+    summary = json.loads(done.out)
+    assert (summary["solids"], summary["islands"], summary["dropped"]) == (solids, islands, dropped)
+    assert triangle_measures(*read_triangles(tmp_path / "a.stl")).pieces == solids
 
 
 @pytest.fixture

@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
-from gyroid_cad.errors import ExportError, KernelError, ParameterError
-from gyroid_cad.filling.fill import Filled, _turn, fill, part_of
-from gyroid_cad.filling.part import Filling
+from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError
+from gyroid_cad.filling.fill import Filled, _turn, fill
+from gyroid_cad.filling.part import Filling, part_of
 from gyroid_cad.filling.wanted import KINDS
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure
@@ -107,11 +107,36 @@ def test_parts_of_any_host_and_of_files_are_the_same_part(tmp_path: Path) -> Non
 
 def test_islands_are_counted_and_dropped_on_request() -> None:
     two = ball().add(ball(5.0 + 3 * RADIUS))
-    both, one = (fill(two, CELL, WALL, fit=COARSE, drop_islands=drop).report for drop in (False, True))
+    with pytest.warns(IslandsWarning, match=r"left \(drop_islands drops\)"):
+        both = fill(two, CELL, WALL, fit=COARSE).report
+    with pytest.warns(IslandsWarning, match=r"dropped \(keep_islands keeps\)"):
+        one = fill(two, CELL, WALL, fit=COARSE, drop_islands=True).report
     assert (both.islands, both.dropped) == (both.solids - 1, 0)
     assert both.islands >= 1
     assert (one.islands, one.dropped, one.solids) == (0, both.islands, 1)
-    assert one.volume < both.volume
+    assert one.volume + one.dropped_volume == pytest.approx(both.volume)
+    assert one.dropped_volume == pytest.approx(both.islands_volume)
+
+
+def test_chips_at_the_corners_of_a_box_of_whole_cells_are_dropped_unless_they_are_to_be_kept() -> None:
+    box = cq.Workplane().box(8, 8, 8, centered=False)
+    with pytest.warns(IslandsWarning, match=r"2 islands, 0\.0\d* mm3 in all: dropped"):
+        made = fill(box, 8, density=0.2, fit=COARSE)
+    with pytest.warns(IslandsWarning, match=r"2 islands, 0\.0\d* mm3 in all: left"):
+        whole = fill(box, 8, density=0.2, fit=COARSE, keep_islands=True)
+    assert (made.report.solids, made.report.islands, made.report.dropped) == (1, 0, 2)
+    assert (whole.report.solids, whole.report.islands, whole.report.dropped) == (3, 2, 0)
+    assert measure(made.solid())[0] == pytest.approx(made.report.volume, rel=1e-4)
+    assert made.report.volume + made.report.dropped_volume == pytest.approx(whole.report.volume, rel=1e-12)
+    assert made.report.density == made.report.volume / made.report.part_volume
+
+
+def test_small_islands_of_the_bare_surface_are_told_by_their_area() -> None:
+    box = cq.Workplane().box(8, 8, 8, centered=False)
+    made, whole = (fill(box, 8, kind="surface", fit=COARSE, keep_islands=keep).report for keep in (False, True))
+    assert made.dropped == whole.islands - made.islands
+    assert made.dropped_volume == made.islands_volume == 0
+    assert made.area <= whole.area
 
 
 def test_a_box_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,7 +153,7 @@ def test_a_box_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: p
 @pytest.mark.parametrize("side", [1.0, 2.0, 4.0])
 def test_small_boxes_at_the_origin_are_cut_as_large_ones_are(side: float) -> None:
     box = cq.Workplane().box(side, side, side, centered=False)
-    both = [fill(box, 7.0, 0.6, kind=kind, fit=COARSE).report for kind in ("sheet", "channels")]
+    both = [fill(box, 7.0, 0.6, kind=kind, fit=COARSE, keep_islands=True).report for kind in ("sheet", "channels")]
     assert all(report.by_sections for report in both)
     assert sum(report.volume for report in both) == pytest.approx(side**3, rel=1e-6)
 
@@ -153,7 +178,8 @@ def test_the_wall_in_a_box_and_its_channels_are_the_whole_box_however_the_lattic
 def test_whole_cells_are_as_dense_as_was_asked_wherever_they_begin() -> None:
     box = cq.Workplane().box(2 * CELL, CELL, CELL)
     for origin in ((0, 0, 0), (1.1, 2.3, 4.7)):
-        assert fill(box, CELL, density=0.3, origin=origin).report.density == pytest.approx(0.3, rel=1e-6)
+        made = fill(box, CELL, density=0.3, origin=origin, keep_islands=True)
+        assert made.report.density == pytest.approx(0.3, rel=1e-6)
 
 
 # No corner of the lattice lies in a side of the box: the lattice would be shifted, and the surface another.
@@ -272,6 +298,7 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"thickness": "1 - x"}, "at (x, y, z) = ("),
         ({"skin": 0}, "skin = 0"),
         ({"skin": 9}, "skin = 9"),
+        ({"keep_islands": True, "drop_islands": True}, "one of keep_islands and drop_islands, not both"),
         ({"openings": [">Z"]}, "none without a skin"),
         ({"skin": 0.4, "openings": ["up"]}, "openings = 'up'"),
         ({"skin": 0.4, "openings": [(50, 0, 0)]}, "a point on a face; the nearest is"),

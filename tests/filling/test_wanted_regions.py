@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.field import Field
 from gyroid_cad.filling.wanted import CHANNELS, NETWORK_A, NETWORK_B, SHEET, SURFACE, regions_of
 from gyroid_cad.surface.families import USUAL
 
@@ -57,3 +61,14 @@ def test_the_bare_surface_is_one_face_without_a_wall() -> None:
     made = regions_of(SURFACE, L, None, None, TUBE)
     assert made.regions[0].sides == [(1, False)]
     assert made.thickness == 0
+
+
+@pytest.mark.parametrize("given", ["0.4", "0.2 + 0.2", 0.4, Field(lambda x, y, z: 0.4, "0.4", 0.4)])
+def test_a_networks_density_is_one_number_in_whatever_form_a_door_hands_it_over(given: Any) -> None:
+    assert regions_of(NETWORK_A, L, None, given, TUBE) == regions_of(NETWORK_A, L, None, 0.4, TUBE)
+
+
+@pytest.mark.parametrize("given", ["0.3 + 0.01*x", "0.01", "1.2", "nan", True, None])
+def test_a_networks_density_that_varies_or_leaves_its_range_is_refused_with_the_range(given: Any) -> None:
+    with pytest.raises(ParameterError, match="density"):
+        regions_of(NETWORK_B, L, None, given, TUBE)

@@ -6,20 +6,16 @@ from pathlib import Path
 
 import build123d as bd
 import pytest
-from OCP.TopoDS import TopoDS_Shape
+from OCP.TopAbs import TopAbs_FACE
 
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.check import topology
-from gyroid_cad.kernel.coloured import Colour, coloured_shapes
+from gyroid_cad.kernel.check import parts_of, topology
+from gyroid_cad.kernel.coloured import Colour, ColouredPart, coloured_parts, extent_of
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import write_step
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 ORANGE = (0.8, 0.4, 0.1)
-
-
-def centre(shape: TopoDS_Shape) -> tuple[float, ...]:
-    return tuple((bounding_box(shape).mean(axis=0).round(6) + 0.0).tolist())
 
 
 def rounded(colour: Colour) -> Colour:
@@ -56,35 +52,60 @@ def nested(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return path
 
 
-def test_shapes_of_nested_assemblies_stand_where_their_places_carry_them_in_their_colours(nested: Path) -> None:
-    found = {centre(shape): rounded(colour) for shape, colour in coloured_shapes(nested)}
-    assert found == {(0, 0, 0): RED, (3, 0, 0): ORANGE, (0, 10, 0): RED, (0, 13, 0): ORANGE}
+def middles(part: ColouredPart) -> list[tuple[float, ...]]:
+    """Of a part, in each of its places."""
+    found = part.places[..., :3] @ bounding_box(part.shape).mean(axis=0) + part.places[..., 3]
+    return [tuple(middle) for middle in (found.round(6) + 0.0).tolist()]
 
 
-def test_faces_of_other_colours_than_their_solids_are_taken_apart_and_none_is_lost(tmp_path: Path) -> None:
+def test_parts_of_nested_assemblies_are_found_once_and_where_their_places_carry_them(nested: Path) -> None:
+    found: dict[Colour, list[tuple[float, ...]]] = {}
+    for part in coloured_parts(nested):
+        (colour,) = set(map(rounded, part.colours))
+        found[colour] = sorted(found.get(colour, []) + middles(part))
+    assert found == {RED: [(0, 0, 0), (0, 10, 0)], ORANGE: [(0, 13, 0), (3, 0, 0)]}
+
+
+def test_faces_have_their_own_colours_or_those_of_their_part(tmp_path: Path) -> None:
+    """Two parts, each with a face of its own colour: neither gets those of the other."""
     cq = pytest.importorskip("cadquery", reason="no CadQuery for this kernel")
-    box = cq.Workplane().box(2, 2, 2)
     assembly = cq.Assembly(name="painted")
-    assembly.add(box, name="box", color=cq.Color(*BLUE))
-    assembly["box"].addSubshape(box.faces(">Z").val(), color=cq.Color(*RED))
-    assembly.add(box.translate((5, 0, 0)), name="plain")
+    for name, place, side in (("one", (0, 0, 0), ">Z"), ("other", (5, 0, 0), "<X")):
+        box = cq.Workplane().box(2, 2, 2 if name == "one" else 3)
+        assembly.add(box, name=name, loc=cq.Location(place), color=cq.Color(*BLUE))
+        assembly[name].addSubshape(box.faces(side).val(), color=cq.Color(*RED))
+    assembly.add(cq.Workplane().box(1, 1, 1), name="plain", loc=cq.Location((9, 0, 0)))
     assembly.export(str(tmp_path / "painted.step"))
-    found = coloured_shapes(tmp_path / "painted.step")
-    counted = {(rounded(colour), centre(shape)): topology(shape).faces for shape, colour in found}
-    assert counted[RED, (0, 0, 1)] == 1
-    assert counted[BLUE, (0, 0, 0)] == 5
-    assert sum(counted.values()) == 12
+    red = {}
+    for part in coloured_parts(tmp_path / "painted.step"):
+        faces = zip(parts_of(part.shape, TopAbs_FACE), part.colours, strict=True)
+        red[middles(part)[0]] = [
+            tuple(bounding_box(face).mean(axis=0)) for face, colour in faces if rounded(colour) == RED
+        ]
+    assert red == {(0, 0, 0): [pytest.approx((0, 0, 1))], (5, 0, 0): [pytest.approx((-1, 0, 0))], (9, 0, 0): []}
+
+
+def test_an_occurrence_s_own_colour_goes_before_that_of_its_part(tmp_path: Path) -> None:
+    cq = pytest.importorskip("cadquery", reason="no CadQuery for this kernel")
+    box = cq.Workplane().box(1, 1, 1)
+    assembly = cq.Assembly(name="two")
+    assembly.add(box, name="blue", color=cq.Color(*BLUE))
+    assembly.add(box, name="red", loc=cq.Location((3, 0, 0)), color=cq.Color(*RED))
+    assembly.export(str(tmp_path / "two.step"))
+    found = {rounded(part.colours[0]): middles(part) for part in coloured_parts(tmp_path / "two.step")}
+    assert found == {BLUE: [(0, 0, 0)], RED: [(3, 0, 0)]}
 
 
 def test_a_file_that_says_nothing_of_colours_holds_its_shape_whole(tmp_path: Path) -> None:
     write_step(bd.Box(1, 2, 3).wrapped, tmp_path / "plain.step")
-    ((shape, colour),) = coloured_shapes(tmp_path / "plain.step")
-    assert colour is None
-    assert topology(shape).solids == 1
+    (part,) = coloured_parts(tmp_path / "plain.step")
+    assert part.colours == (None,) * 6
+    assert topology(part.shape).solids == 1
+    assert extent_of([part]) == pytest.approx(14**0.5, abs=1e-3)
 
 
 def test_what_is_no_step_file_is_an_export_error(tmp_path: Path) -> None:
     (tmp_path / "text.step").write_text("text")
     for name in ("text.step", "missing.step"):
         with pytest.raises(ExportError, match="could not be read as STEP"):
-            coloured_shapes(tmp_path / name)
+            coloured_parts(tmp_path / name)

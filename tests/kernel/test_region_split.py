@@ -29,7 +29,8 @@ from gyroid_cad.kernel.solid import build_faces
 from gyroid_cad.kernel.split import Pieces, bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.wall.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.covering import CROSSING, INSIDE, SIDE_SAMPLES, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.exact import patch_points_and_normals
 from gyroid_cad.wall.offset import build_wall
 
 Floats = NDArray[np.float64]
@@ -73,7 +74,9 @@ def lattice_in(part: Part) -> tuple[Faces, Faces]:
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
     cloud, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, L, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.contains)
+    samples = np.linspace(-1, 1, SIDE_SAMPLES)
+    points = FRAME.placed(patch_points_and_normals(complex, L, samples)[0])
+    sides = patch_sides(complex, points, THICKNESS / 2, lambda points: tree.query(points)[0] - error, part.contains)
     wall = build_wall(complex, fit_patch(COARSE), L, THICKNESS).moved(FRAME.rotation, FRAME.origin)
     faces = [(as_face(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (

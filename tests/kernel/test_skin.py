@@ -29,7 +29,8 @@ from gyroid_cad.kernel.solid import build_faces
 from gyroid_cad.kernel.split import bounded_solids, compound_of, split
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.fit import FitSettings, fit_patch
-from gyroid_cad.wall.covering import CROSSING, INSIDE, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.covering import CROSSING, INSIDE, SIDE_SAMPLES, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.exact import patch_points_and_normals
 from gyroid_cad.wall.offset import build_wall
 
 Floats = NDArray[np.float64]
@@ -110,7 +111,9 @@ def filled(name: str) -> tuple[Part, Hollow, TopoDS_Shape, TopoDS_Shape]:
     complex = covering_complex(core.low, core.high, FRAME, CELL, WALL / 2)
     cloud, error = core.surface_samples(CELL / 12)
     tree = cKDTree(cloud)
-    sides = patch_sides(complex, FRAME, CELL, WALL / 2, lambda points: tree.query(points)[0] - error, core.contains)
+    samples = np.linspace(-1, 1, SIDE_SAMPLES)
+    points = FRAME.placed(patch_points_and_normals(complex, CELL, samples)[0])
+    sides = patch_sides(complex, points, WALL / 2, lambda points: tree.query(points)[0] - error, core.contains)
     wall = build_wall(complex, fit_patch(FitSettings(6)), CELL, WALL).moved(FRAME.rotation, FRAME.origin)
     faces = [(as_face(below.Reversed()), above) for below, above in build_faces(wall)]
     cut, whole = (

@@ -12,8 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gyroid_cad import Bend, Cylinder, Lattice, Sphere, Twist
+from gyroid_cad import Lattice
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
+from gyroid_cad.maps import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.block import MAPS, parse_map
 from gyroid_cad.maps.space import BlockMap, Size, SpaceMap, carried, differences
 

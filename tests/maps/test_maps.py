@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from gyroid_cad import Bend, Cylinder, Lattice, Sphere, Twist
+from gyroid_cad import Lattice
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.maps import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.block import as_map
 from gyroid_cad.maps.space import BlockMap, Size, SpaceMap, carried, differences
 from gyroid_cad.wall.complex import build_complex

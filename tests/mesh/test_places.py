@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gyroid_cad.mesh.nodes import patch_nodes, place_count
 from gyroid_cad.wall.complex import build_complex
-from gyroid_cad.wall.exact import patch_points
+from gyroid_cad.wall.exact import patch_points_and_normals
 
 sides = st.integers(1, 3)
 
@@ -25,7 +25,7 @@ def test_every_number_up_to_the_count_is_used(cells: tuple[int, int, int], steps
 def test_equal_numbers_stand_at_equal_places(steps: int) -> None:
     complex = build_complex((2, 2, 1))
     numbers = patch_nodes(complex, steps).reshape(complex.patch_count, -1)
-    points = patch_points(complex, 10.0, np.linspace(-1, 1, steps + 1))
+    points = patch_points_and_normals(complex, 10.0, np.linspace(-1, 1, steps + 1))[0]
     by_number = np.full((place_count(complex, steps), 3), np.nan)
     by_number[numbers] = points
     np.testing.assert_allclose(by_number[numbers], points, atol=1e-12)
@@ -35,9 +35,9 @@ def test_places_coincide_only_where_fans_meet_in_one_corner() -> None:
     complex = build_complex((2, 2, 1))
     steps = 4
     points = np.full((place_count(complex, steps), 3), np.nan)
-    points[patch_nodes(complex, steps).reshape(complex.patch_count, -1)] = patch_points(
+    points[patch_nodes(complex, steps).reshape(complex.patch_count, -1)] = patch_points_and_normals(
         complex, 10.0, np.linspace(-1, 1, steps + 1)
-    )
+    )[0]
     distinct = np.unique(np.round(points, 6), axis=0)
     assert len(points) - len(distinct) == complex.fan_count - len(complex.corner_quarters) > 0
 

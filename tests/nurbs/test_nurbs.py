@@ -13,15 +13,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.nurbs.surface import (
-    NurbsCurve,
-    NurbsSurface,
-    basis,
-    edge_row,
-    gauss_points,
-    grid_derivatives,
-    uniform_knots,
-)
+from gyroid_cad.nurbs.basis import basis, gauss_points, uniform_knots
+from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface, edge_row, grid_derivatives
 from gyroid_cad.surface.fit import FitSettings
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.nurbs.surface import NurbsSurface, uniform_knots
+from gyroid_cad.nurbs.basis import uniform_knots
+from gyroid_cad.nurbs.surface import NurbsSurface
 from gyroid_cad.nurbs.volume import NurbsVolume
 
 LINE = np.array([0.0, 0.0, 1.0, 1.0])

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from gyroid_cad.nurbs.basis import uniform_knots
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
-from gyroid_cad.nurbs.surface import uniform_knots
-from gyroid_cad.trim.edge_crossings import Faces
+from gyroid_cad.trim.edge_crossings import FacesToCut
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ def wavy(x: Floats, y: Floats) -> Floats:
     return 0.4 * x * y + 0.3 * x * x - 0.2 * y
 
 
-def bent(graph: Graph, lean: float) -> tuple[Faces, SquareQuadrature, Floats]:
+def bent(graph: Graph, lean: float) -> tuple[FacesToCut, SquareQuadrature, Floats]:
     face = graph(wavy, {}, lean)
     quadrature = SquareQuadrature(face.knots)
     return face, quadrature, quadrature.densities(face.nets, face.weights)[0]

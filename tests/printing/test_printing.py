@@ -143,6 +143,21 @@ def test_a_void_within_a_ball_is_trapped_and_a_part_of_two_is_not_one_piece() ->
     assert ("trapped voids", "1 regions that do not reach outside", "1: resin cannot leave") in check.rows()
 
 
+def test_a_part_that_falls_into_pieces_does_not_pass() -> None:
+    apart = [trimesh.creation.box([5, 5, 5], trimesh.transformations.translation_matrix([x, 0, 0])) for x in (0, 9)]
+    mesh = trimesh.util.concatenate(apart)
+    check = print_check((mesh.vertices, mesh.faces))
+    assert (check.pieces, check.passed) == (2, False)
+    assert ("pieces", "2", "falls apart") in check.rows()
+    assert print_check((apart[0].vertices, apart[0].faces)).passed
+
+
+def test_chips_of_a_trimmed_lattice_fail_only_where_they_are_kept() -> None:
+    small = {"cells": (1, 1, 1), "cell_size": 12.0, "thickness": 1.0, "fit": COARSE, "trim": "box"}
+    checks = [print_check(Lattice(**small, keep_islands=keep), deviation=0.05) for keep in (False, True)]  # type: ignore[arg-type]
+    assert [(check.pieces, check.passed) for check in checks] == [(1, True), (3, False)]
+
+
 def test_open_triangles_do_not_pass() -> None:
     box = trimesh.creation.box([5, 5, 5])
     check = print_check((box.vertices, box.faces[1:]))

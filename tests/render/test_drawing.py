@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 
-import cadquery as cq
+import build123d as bd
 import manifold3d
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from PIL import Image
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.render.drawing import draw, snug_size
-from gyroid_cad.render.facets import COLOURS, Facets, facets_of_shape, facets_of_triangles, facets_of_wall, joined
+from gyroid_cad.render.facets import COLOURS, Facets, facets_of_shape, facets_of_triangles, facets_of_wall
 from gyroid_cad.render.picture import VIEWS
 from gyroid_cad.surface.fit import FitSettings
 
@@ -55,7 +55,7 @@ def brightness(image: Bytes) -> NDArray[np.int64]:
 
 
 def test_two_triangles_of_a_square_cover_each_pixel_once_and_leave_the_margin_free() -> None:
-    seen = opacity(draw(square(), (100, 100), FROM_ABOVE))
+    seen = opacity(draw([square()], (100, 100), FROM_ABOVE))
     assert np.array_equal(np.unique(seen), [0, 1])
     assert np.array_equal(np.flatnonzero(seen[50]), np.arange(2, 98))
     assert seen.sum() == 96**2
@@ -63,7 +63,7 @@ def test_two_triangles_of_a_square_cover_each_pixel_once_and_leave_the_margin_fr
 
 def test_a_ball_covers_its_circle_from_wherever_it_is_seen() -> None:
     for camera in (*VIEWS.values(), (0.0, 0.0, -1.0)):
-        seen = opacity(draw(ball(), (200, 200), camera))
+        seen = opacity(draw([ball()], (200, 200), camera))
         assert seen.sum() == pytest.approx(np.pi * (0.96 * 100) ** 2, rel=2e-3)
 
 
@@ -83,7 +83,7 @@ def test_a_lattice_covers_as_much_as_its_shadow() -> None:
 def test_a_ray_through_a_pixel_hits_something_just_where_the_picture_is_opaque(seed: int) -> None:
     corners = np.random.default_rng(seed).uniform(-1, 1, (15, 3))
     triangles = np.arange(15).reshape(5, 3)
-    seen = opacity(draw(facets_of_triangles(corners, triangles, closed=False), (40, 40), FROM_ABOVE))
+    seen = opacity(draw([facets_of_triangles(corners, triangles, closed=False)], (40, 40), FROM_ABOVE))
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = 40 * 0.96 / (high - low)[:2].max()
     sure = np.argwhere((seen == 0) | (seen == 1))
@@ -116,20 +116,20 @@ def test_a_snug_picture_has_the_proportions_of_what_it_shows(
 ) -> None:
     box = trimesh.creation.box((200.0, 98.0, 196.0))
     facets = facets_of_triangles(box.vertices, box.faces, closed=True)
-    width, height = snug_size(facets, camera, 200)
+    width, height = snug_size([facets], camera, 200)
     assert (height, width) == pytest.approx(shape, abs=5)
-    seen = opacity(draw(facets, (width, height), camera))
+    seen = opacity(draw([facets], (width, height), camera))
     assert seen.sum() == pytest.approx(0.96**2 * width * height, rel=0.03)
 
 
 def test_a_picture_so_large_that_it_is_drawn_in_parts_has_no_seams() -> None:
-    image = draw(square(), (4096, 300), FROM_ABOVE)
+    image = draw([square()], (4096, 300), FROM_ABOVE)
     inside = image[10:-10, 2048]
     assert np.array_equal(inside, np.broadcast_to(inside[0], inside.shape))
 
 
 def test_a_sheet_seen_edge_on_is_not_seen() -> None:
-    assert not draw(square(), (50, 40), (0.0, -1.0, 0.0)).any()
+    assert not draw([square()], (50, 40), (0.0, -1.0, 0.0)).any()
 
 
 # What hides what.
@@ -137,7 +137,7 @@ def test_a_sheet_seen_edge_on_is_not_seen() -> None:
 
 def test_the_nearer_of_two_is_seen_whichever_comes_first() -> None:
     near, far = square(RED, height=1.0, size=0.5), square(BLUE)
-    pictures = [draw(joined(parts), (60, 60), FROM_ABOVE) for parts in ((near, far), (far, near))]
+    pictures = [draw(parts, (60, 60), FROM_ABOVE) for parts in ((near, far), (far, near))]
     assert np.array_equal(*pictures)
     (red, _, blue, _), border = pictures[0][30, 30], pictures[0][30, 8]
     assert (red > 100, blue) == (True, 0)
@@ -153,7 +153,7 @@ def test_the_order_and_the_way_round_of_triangles_change_nothing(seed: int) -> N
     other = triangles[random.permutation(20)]
     other[::2] = other[::2, [0, 2, 1]]
     one, two = (
-        draw(facets_of_triangles(corners, some, closed=False), (64, 48)).astype(int) for some in (triangles, other)
+        draw([facets_of_triangles(corners, some, closed=False)], (64, 48)).astype(int) for some in (triangles, other)
     )
     # Where a sample's middle is on a side but for rounding it may go either way.
     assert np.mean(np.abs(one - two) > 5) < 4e-3
@@ -161,12 +161,12 @@ def test_the_order_and_the_way_round_of_triangles_change_nothing(seed: int) -> N
 
 def test_a_closed_surface_looks_the_same_with_or_without_its_back() -> None:
     front = ball(3)
-    assert np.array_equal(draw(front, (100, 100)), draw(seen_from_both_sides(front), (100, 100)))
+    assert np.array_equal(draw([front], (100, 100)), draw([seen_from_both_sides(front)], (100, 100)))
 
 
 def test_a_lattice_looks_the_same_with_or_without_the_backs_of_its_faces() -> None:
     front = facets_of_wall(Lattice((1, 1, 1), 10.0, 0.8).fitted().wall)
-    pictures = [draw(facets, (150, 150)).astype(int) for facets in (front, seen_from_both_sides(front))]
+    pictures = [draw([facets], (150, 150)).astype(int) for facets in (front, seen_from_both_sides(front))]
     # Along outlines and edges rounding may choose another triangle.
     assert np.mean(np.abs(pictures[0] - pictures[1]).max(axis=-1) > 8) < 0.01
 
@@ -175,7 +175,7 @@ def test_a_lattice_looks_the_same_with_or_without_the_backs_of_its_faces() -> No
 
 
 def test_a_ball_is_brightest_towards_the_light_and_the_same_on_all_sides() -> None:
-    views = [draw(ball(), (120, 120), camera).astype(int) for camera in ((1, 0, 0.2), (-2, 3, 1))]
+    views = [draw([ball()], (120, 120), camera).astype(int) for camera in ((1, 0, 0.2), (-2, 3, 1))]
     assert np.median(np.abs(views[0] - views[1])) <= 3
     row, column = np.unravel_index(np.argmax(brightness(views[0].astype(np.uint8))), (120, 120))
     assert row < 60
@@ -184,7 +184,7 @@ def test_a_ball_is_brightest_towards_the_light_and_the_same_on_all_sides() -> No
 
 def test_no_face_is_black_from_any_side() -> None:
     for camera in ((0.0, 0.0, 1.0), (0.3, 0.2, -1.0), (1.0, 1.0, 0.5)):
-        image = draw(ball(), (120, 120), camera)
+        image = draw([ball()], (120, 120), camera)
         inside = brightness(image)[30:90, 30:90]
         assert inside.min() > 0.5 * inside.max()
 
@@ -203,28 +203,28 @@ def shares(image: Bytes) -> list[float]:
 
 def test_both_sides_of_a_wall_have_their_colours_whether_the_kernel_made_the_solid_or_not() -> None:
     lattice = Lattice((2, 2, 2), 10, 0.8, fit=FitSettings(5))
-    wall = shares(draw(facets_of_wall(lattice.fitted().wall), (200, 200)))
-    solid = shares(draw(facets_of_shape(lattice.solid()), (200, 200)))
+    wall = shares(draw([facets_of_wall(lattice.fitted().wall)], (200, 200)))
+    solid = shares(draw([facets_of_shape(lattice.solid())], (200, 200)))
     assert min(wall) > 0.1
     assert solid == pytest.approx(wall, abs=0.02)
 
 
 def test_faces_that_cut_a_lattice_or_are_no_lattices_have_the_third_colour() -> None:
     block = shares(
-        draw(facets_of_shape(Lattice((1, 1, 1), 10, 0.8, fit=FitSettings(5), trim="box").solid()), (200, 200))
+        draw([facets_of_shape(Lattice((1, 1, 1), 10, 0.8, fit=FitSettings(5), trim="box").solid())], (200, 200))
     )
     assert min(block) > 0.1
-    box = shares(draw(facets_of_shape(cq.Workplane().box(1, 2, 3).val().wrapped), (100, 100)))
+    box = shares(draw([facets_of_shape(bd.Box(1, 2, 3).wrapped)], (100, 100)))
     assert box == [0, 0, 1]
 
 
 def test_a_line_is_dark_along_edges_and_outlines_and_fine_where_faces_meet_smoothly() -> None:
     folded = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1], [2, 1, 1]], dtype=float)
     triangles = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]
-    sharp = draw(facets_of_triangles(folded, triangles, closed=False), (200, 104), FROM_ABOVE)
+    sharp = draw([facets_of_triangles(folded, triangles, closed=False)], (200, 104), FROM_ABOVE)
     flat = folded * (1, 1, 0)
     one_face, two_faces = (
-        draw(facets_of_triangles(flat, triangles, closed=False, faces=np.array(faces)), (200, 104), FROM_ABOVE)
+        draw([facets_of_triangles(flat, triangles, closed=False, faces=np.array(faces))], (200, 104), FROM_ABOVE)
         for faces in ([0, 0, 0, 0], [0, 0, 1, 1])
     )
     middle = slice(98, 102)
@@ -238,9 +238,9 @@ def test_a_line_is_dark_along_edges_and_outlines_and_fine_where_faces_meet_smoot
 
 
 def test_smooth_triangles_show_no_facets_and_a_box_no_rounding() -> None:
-    coarse, fine = (draw(ball(subdivisions), (200, 200)) for subdivisions in (2, 5))
+    coarse, fine = (draw([ball(subdivisions)], (200, 200)) for subdivisions in (2, 5))
     inside = np.s_[50:150, 50:150]
     assert np.abs(brightness(coarse)[inside] - brightness(fine)[inside]).mean() < 8
     box = trimesh.creation.box((1, 1, 1))
-    image = draw(facets_of_triangles(box.vertices, box.faces, closed=True), (100, 100), FROM_ABOVE)
+    image = draw([facets_of_triangles(box.vertices, box.faces, closed=True)], (100, 100), FROM_ABOVE)
     assert np.ptp(brightness(image)[10:-10, 10:-10]) == 0

@@ -16,7 +16,7 @@ from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
-from gyroid_cad.wall.exact import patch_points
+from gyroid_cad.wall.exact import patch_points_and_normals
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -41,7 +41,7 @@ def gyroid() -> Pores:
 def exact_distance(surface: str, place: Floats) -> float:
     """From a place to the exact endless surface, by searching the Weierstrass map: no NURBS, no tree."""
     complex = Lattice((1, 1, 1), SIZE, WALL, surface=surface).fitted().complex
-    grid = patch_points(complex, SIZE, np.linspace(-1, 1, 7)).reshape(-1, 3)
+    grid = patch_points_and_normals(complex, SIZE, np.linspace(-1, 1, 7))[0].reshape(-1, 3)
     images = np.round((place - grid) / SIZE) * SIZE
     gaps = np.linalg.norm(place - grid - images, axis=1)
     order = np.argsort(gaps)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.surface import gauss_points
+from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import EDGE_GAP_LIMIT, FitSettings, FittedPatch, edge_gap, fit_patch, require_shared_edges
 from gyroid_cad.surface.fit_report import fit_report

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.covering import CROSSING, INSIDE, OUTSIDE, Frame, covering_complex, patch_sides
-from gyroid_cad.wall.exact import patch_points
+from gyroid_cad.wall.covering import CROSSING, INSIDE, OUTSIDE, SIDE_SAMPLES, Frame, covering_complex, patch_sides
+from gyroid_cad.wall.exact import patch_points_and_normals
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +37,11 @@ def ball(centre: Floats, radius: float) -> tuple[Callable[[Floats], Floats], Cal
     return distance, lambda points: np.linalg.norm(points - centre, axis=-1) < radius
 
 
+def sampled(complex: CellComplex, frame: Frame, samples: Floats | None = None) -> Floats:
+    along = np.linspace(-1, 1, SIDE_SAMPLES) if samples is None else samples
+    return frame.placed(patch_points_and_normals(complex, L, along)[0])
+
+
 def ids(complex: CellComplex) -> set[tuple[int, ...]]:
     return set(map(tuple, np.column_stack([complex.patch_placement, complex.patch_cell]).tolist()))
 
@@ -56,7 +61,7 @@ def test_no_patch_that_comes_within_reach_of_the_box_is_missing(
     made = covering_complex(low, high, frame, L, REACH)
     middle = np.round(frame.own((low + high) / 2) / L).astype(int)
     block = build_complex((8, 8, 8), first=tuple((middle - 4).tolist()))
-    points = frame.placed(patch_points(block, L, DENSE[::3]))
+    points = sampled(block, frame, DENSE[::3])
     outside = np.maximum(np.maximum(low - points, points - high), 0)
     within = np.linalg.norm(outside, axis=-1).min(axis=1) <= REACH
     block_ids = np.column_stack([block.patch_placement, block.patch_cell])
@@ -76,8 +81,8 @@ def test_what_lies_inside_a_ball_or_outside_is_told_from_what_it_crosses(
 ) -> None:
     frame, middle = frame_of(turn, (1.0, 2.0, 3.0)), np.array(centre)
     complex = covering_complex(middle - radius, middle + radius, frame, L, REACH)
-    sides = patch_sides(complex, frame, L, REACH, *ball(middle, radius))
-    from_centre = np.linalg.norm(frame.placed(patch_points(complex, L, DENSE)) - middle, axis=-1)
+    sides = patch_sides(complex, sampled(complex, frame), REACH, *ball(middle, radius))
+    from_centre = np.linalg.norm(sampled(complex, frame, DENSE) - middle, axis=-1)
     assert np.all(from_centre[sides == INSIDE] < radius - REACH)
     assert np.all(from_centre[sides == OUTSIDE] > radius + REACH)
     assert np.all(sides[(from_centre.min(axis=1) < radius) & (from_centre.max(axis=1) > radius)] == CROSSING)
@@ -86,8 +91,8 @@ def test_what_lies_inside_a_ball_or_outside_is_told_from_what_it_crosses(
 def test_patches_well_inside_need_no_cutting() -> None:
     middle, radius = np.zeros(3), 5 * L
     complex = covering_complex(middle - radius, middle + radius, STRAIGHT, L, REACH)
-    sides = patch_sides(complex, STRAIGHT, L, REACH, *ball(middle, radius))
-    farthest = np.linalg.norm(patch_points(complex, L, DENSE), axis=-1).max(axis=1)
+    sides = patch_sides(complex, sampled(complex, STRAIGHT), REACH, *ball(middle, radius))
+    farthest = np.linalg.norm(sampled(complex, STRAIGHT, DENSE), axis=-1).max(axis=1)
     assert np.all(sides[farthest < radius - REACH - L / 6] == INSIDE)
 
 
@@ -100,6 +105,6 @@ def test_where_the_boundary_is_far_one_point_tells_of_all(inside: bool) -> None:
         requested.append(len(points))
         return np.full(len(points), inside)
 
-    sides = patch_sides(complex, STRAIGHT, L, REACH, lambda points: np.full(len(points), 1e3), contains)
+    sides = patch_sides(complex, sampled(complex, STRAIGHT), REACH, lambda points: np.full(len(points), 1e3), contains)
     assert np.all(sides == (INSIDE if inside else OUTSIDE))
     assert requested == [complex.component_count]

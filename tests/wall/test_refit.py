@@ -18,7 +18,8 @@ from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.fields.field import Field, as_field
 from gyroid_cad.maps.block import Bend, Cylinder, Sphere, Twist
 from gyroid_cad.maps.space import SpaceMap
-from gyroid_cad.nurbs.surface import NurbsSurface, basis, edge_row, uniform_knots
+from gyroid_cad.nurbs.basis import basis, uniform_knots
+from gyroid_cad.nurbs.surface import NurbsSurface, edge_row
 from gyroid_cad.surface.fit import MOST_CONTROL_POINTS, FitSettings, fit_patch
 from gyroid_cad.wall import refit as refit_module
 from gyroid_cad.wall.complex import CellComplex, build_complex

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.surface import NurbsSurface, basis, gauss_points
+from gyroid_cad.nurbs.basis import basis, gauss_points
+from gyroid_cad.nurbs.surface import NurbsSurface
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch, max_offset
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements, bounding_cell

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.mesh.finite_elements.data import MeshData
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
-__all__ = ["abaqus_name", "write_abaqus", "write_periodic_equations"]
+__all__ = ["abaqus_name", "write_abaqus"]
 
 Integers = NDArray[np.int64]
 
@@ -27,7 +27,7 @@ _ROWS_AT_ONCE = 20_000
 _NUMBERS_A_LINE = 16
 
 
-def abaqus_name(mesh: Mesh) -> str:
+def abaqus_name(mesh: MeshData) -> str:
     """Abaqus's name of a mesh's elements.
 
     Raises
@@ -42,7 +42,7 @@ def abaqus_name(mesh: Mesh) -> str:
 
 
 def write_abaqus(
-    mesh: Mesh, file: TextIO, pairs: PeriodicPairs | None = None, progress: Progress | None = None
+    mesh: MeshData, file: TextIO, pairs: PeriodicPairs | None = None, progress: Progress | None = None
 ) -> None:
     """Write nodes, elements, their sets and surfaces; materials and steps are the user's, by ``*INCLUDE``.
 
@@ -51,7 +51,7 @@ def write_abaqus(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : MeshData
     file : text file
     pairs : PeriodicPairs, optional
     progress : callable, optional
@@ -89,7 +89,7 @@ def write_abaqus(
     report_progress(progress, "mesh", total, total)
 
 
-def _node_sets(mesh: Mesh, pairs: PeriodicPairs | None) -> Iterator[tuple[str, Integers]]:
+def _node_sets(mesh: MeshData, pairs: PeriodicPairs | None) -> Iterator[tuple[str, Integers]]:
     yield from mesh.node_sets().items()
     for blocks, nodes in (pairs.by_translation() if pairs else {}).items():
         name = "_".join(f"M{-count}" if count < 0 else str(count) for count in blocks)
@@ -108,25 +108,3 @@ def _lines(numbers: Iterable[int]) -> str:
     words = [str(number) for number in numbers]
     lines = [",".join(words[first : first + _NUMBERS_A_LINE]) for first in range(0, len(words), _NUMBERS_A_LINE)]
     return ",\n".join(lines) + "\n"
-
-
-def write_periodic_equations(pairs: PeriodicPairs, file: TextIO, reference: int) -> None:
-    """Tie periodic nodes by ``*EQUATION``: the second moves as the first, and as the block is stretched between them.
-
-    A node of the user's own, of number ``reference``, holds in its three degrees of freedom how much longer the block
-    gets along x, y and z: prescribed, they are mean strains times the block's period. The mesh's own nodes are numbered
-    from 1.
-
-    Parameters
-    ----------
-    pairs : PeriodicPairs
-    file : text file
-    reference : int
-    """
-    file.write("*EQUATION\n")
-    together = zip(pairs.first.tolist(), pairs.second.tolist(), pairs.blocks.tolist(), strict=True)
-    for first, second, blocks in together:
-        for axis in range(3):
-            terms = [(second + 1, 1.0), (first + 1, -1.0), *([(reference, -blocks[axis])] if blocks[axis] else [])]
-            line = ",".join(f"{node},{axis + 1},{factor:g}" for node, factor in terms)
-            file.write(f"{len(terms)}\n{line}\n")

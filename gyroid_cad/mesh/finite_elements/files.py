@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.files import replacing, require_distinct, require_writable
 from gyroid_cad.common.formats import (
     ABAQUS,
     ANSYS,
@@ -23,13 +23,13 @@ from gyroid_cad.common.formats import (
     listed_endings,
     require_format,
 )
-from gyroid_cad.common.progress import Progress
+from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.mesh.finite_elements.abaqus import abaqus_name, write_abaqus
-from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.mesh.finite_elements.data import MeshData
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
-__all__ = ["require_mesh_format", "write_mesh"]
+__all__ = ["require_mesh_format", "write_mesh_files"]
 
 Integers = NDArray[np.int64]
 
@@ -58,32 +58,25 @@ def require_mesh_format(path: str | os.PathLike[str], full: bool = False) -> Pat
     return require_writable(path)
 
 
-def write_mesh(
-    mesh: Mesh,
-    path: str | os.PathLike[str],
+def write_mesh_files(
+    mesh: MeshData,
+    paths: Sequence[str | os.PathLike[str]],
     pairs: PeriodicPairs | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Write a mesh with its sets; the path's ending chooses the format. The file appears whole or not at all.
-
-    Sets are physical groups and arrays in Gmsh and VTU files, components in ANSYS files, sets and surfaces in
-    Abaqus files, and property numbers (of bounding cells) in NASTRAN files, which know no more.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    path : path-like
-        Ending in .vtu, .msh, .inp, .cdb, .bdf or .nas.
-    pairs : PeriodicPairs, optional
-        In VTU and Abaqus files.
-    progress : callable, optional
-        Called with (stage, done, total), while Abaqus files are written.
+    """Write a mesh with its sets, as :meth:`gyroid_cad.Mesh.write` says.
 
     Raises
     ------
     ParameterError, ExportError
     """
-    target = require_mesh_format(path, len(mesh.element.nodes) in (9, 27))
+    full = len(mesh.element.nodes) in (9, 27)
+    for target in require_distinct(paths, lambda path: require_mesh_format(path, full)):
+        with timed({}, f"write {target.name}", progress):
+            _write(mesh, target, pairs, progress)
+
+
+def _write(mesh: MeshData, target: Path, pairs: PeriodicPairs | None, progress: Progress | None) -> None:
     form = require_format("output", target, MESH_FORMATS)
     with replacing(target) as temporary:
         if form is ABAQUS:
@@ -109,7 +102,7 @@ def _write_by_meshio(mesh: Any, path: Path, file_format: str, **options: Any) ->
         raise ExportError(f"the mesh was not written: {problem}") from problem
 
 
-def _ids(mesh: Mesh) -> dict[str, Integers]:
+def _ids(mesh: MeshData) -> dict[str, Integers]:
     """Numbers of every element's patch, bounding cell, cubic cell and layer, from 1; shape (elements,) each."""
     complex, patch = mesh.complex, mesh.element_patch
     cell_of_patch = np.unique(complex.patch_cell, axis=0, return_inverse=True)[1].ravel()
@@ -121,7 +114,7 @@ def _ids(mesh: Mesh) -> dict[str, Integers]:
     }
 
 
-def _vtu(mesh: Mesh, pairs: PeriodicPairs | None) -> Any:
+def _vtu(mesh: MeshData, pairs: PeriodicPairs | None) -> Any:
     import meshio
 
     at_nodes: dict[str, Any] = {
@@ -135,7 +128,7 @@ def _vtu(mesh: Mesh, pairs: PeriodicPairs | None) -> Any:
     return meshio.Mesh(mesh.points, cells, at_nodes, {name: [ids] for name, ids in _ids(mesh).items()})
 
 
-def _gmsh(mesh: Mesh) -> Any:
+def _gmsh(mesh: MeshData) -> Any:
     import meshio
 
     ids = _ids(mesh)
@@ -152,7 +145,7 @@ def _gmsh(mesh: Mesh) -> Any:
     return meshio.Mesh(mesh.points, blocks, cell_data=data, field_data=names)
 
 
-def _write_nastran(mesh: Mesh, path: Path) -> None:
+def _write_nastran(mesh: MeshData, path: Path) -> None:
     """A whole deck, without materials and loads; bounding cells are properties."""
     import meshio
 
@@ -178,7 +171,7 @@ def _mapdl_archive(path: str | os.PathLike[str]) -> Any:
     return mapdl_archive, pyvista
 
 
-def _write_ansys(mesh: Mesh, path: Path) -> None:
+def _write_ansys(mesh: MeshData, path: Path) -> None:
     mapdl_archive, pyvista = _mapdl_archive(path)
     vtk_type = {
         "hexahedron": pyvista.CellType.HEXAHEDRON,

@@ -6,22 +6,24 @@ complex; nothing is merged by distance.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.common.tables import Rows, text_table
+from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, ElementType, element_type
-from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
+from gyroid_cad.mesh.finite_elements.data import MeshData
+from gyroid_cad.mesh.finite_elements.elements import ElementType, element_type
+from gyroid_cad.mesh.finite_elements.files import write_mesh_files
+from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
+from gyroid_cad.mesh.nodes import patch_nodes, place_count
 from gyroid_cad.nurbs.surface import grid_points
-from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Mesh", "Surface", "hexahedra", "quadrilaterals"]
+__all__ = ["Mesh", "hexahedra", "quadrilaterals"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -33,25 +35,8 @@ _PATCHES_AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface:
-    """Faces of elements.
-
-    Attributes
-    ----------
-    elements, faces : ndarray of int, shape (faces,)
-        Which element, and which of its faces, from 0.
-    """
-
-    elements: Integers
-    faces: Integers
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
-    """Elements that share nodes by number.
+class Mesh(MeshData):
+    """Elements that share nodes by number, with their sets.
 
     Elements come patch by patch, layer by layer from face B to face A, then along u and v.
 
@@ -69,86 +54,40 @@ class Mesh:
         Of nodes across the wall.
     kept : ndarray of int, shape (nodes,), optional
         Which of all places and levels have a node, if not each does.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> mesh = Lattice(cells=(1, 1, 1), cell_size=10, thickness=0.8).hexahedra(subdivisions=2)
+    >>> mesh.cells.shape
+    (96, 8)
     """
 
-    complex: CellComplex
-    element: ElementType
-    subdivisions: int
-    layers: int
-    points: Floats
-    cells: Integers
-    levels: int
-    kept: Integers | None = None
+    def write(
+        self,
+        *paths: str | os.PathLike[str],
+        pairs: PeriodicPairs | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Write files; each path's ending chooses the program. A file appears whole or not at all.
 
-    def __post_init__(self) -> None:
-        # Made for this mesh alone and by far the largest things about: frozen where they are, not copied.
-        for array in (self.points, self.cells, self.kept):
-            if array is not None:
-                array.setflags(write=False)
+        Sets are physical groups and arrays in Gmsh and VTU files, components in ANSYS files, sets and surfaces in
+        Abaqus files, and property numbers (of bounding cells) in NASTRAN files, which know no more.
 
-    def rows(self) -> Rows:
-        """Subject and finding, line by line, as they are printed."""
-        n, across = self.subdivisions, f"{self.layers} across the wall" if self.layers else "of the mid-surface"
-        return [
-            ("elements", f"{len(self.cells):,} {self.element.name}: {n} x {n} a patch, {across}"),
-            ("nodes", f"{len(self.points):,}"),
-            ("patches", f"{self.complex.patch_count:,}"),
-        ]
+        Parameters
+        ----------
+        *paths : path-like
+            Ending in .vtu, .msh, .inp, .cdb, .bdf or .nas. All are checked before any is written.
+        pairs : PeriodicPairs, optional
+            In VTU and Abaqus files.
+        progress : callable, optional
+            Called with (stage, done, total).
 
-    def __str__(self) -> str:
-        return text_table(self.rows())
-
-    @property
-    def element_patch(self) -> Integers:
-        """Patch of each element; shape (elements,)."""
-        return np.arange(len(self.cells)) // (max(self.layers, 1) * self.subdivisions**2)
-
-    @property
-    def element_layer(self) -> Integers:
-        """Layer of each element, from face B on; shape (elements,)."""
-        return np.arange(len(self.cells)) // self.subdivisions**2 % max(self.layers, 1)
-
-    @property
-    def columns(self) -> tuple[Integers, Integers]:
-        """At which place of the patches' grid, and at which level across the wall, each node stands; shape (nodes,)."""
-        numbers = np.arange(len(self.points)) if self.kept is None else self.kept
-        return np.divmod(numbers, self.levels)
-
-    def surfaces(self) -> dict[str, Surface]:
-        """Faces A and B of the wall and its free side walls, as faces of elements; empty of a mid-surface."""
-        if not self.layers:
-            return {}
-        n = self.subdivisions
-        numbers = np.arange(len(self.cells)).reshape(-1, self.layers, n, n)
-        # Edge k of a patch is the row of its elements along side k of the square.
-        rows = (numbers[..., 0], numbers[:, :, -1], numbers[..., -1], numbers[:, :, 0])
-        free = self.complex.free[self.complex.patch_edges]
-        walls = [(row[free[:, k]].ravel(), face) for k, (row, face) in enumerate(zip(rows, EDGE_FACES, strict=True))]
-        return {
-            FACE_A: _surface([(numbers[:, -1].ravel(), TOP)]),
-            FACE_B: _surface([(numbers[:, 0].ravel(), BOTTOM)]),
-            FREE_WALLS: _surface(walls),
-        }
-
-    def surface_nodes(self, surface: Surface) -> Integers:
-        """Nodes of every face of a surface, outwards; shape (faces, nodes of a face)."""
-        return np.asarray(self.cells[surface.elements[:, np.newaxis], self.element.faces[surface.faces]])
-
-    def node_sets(self) -> dict[str, Integers]:
-        """Nodes on the surfaces, by their names, ascending."""
-        return {name: np.unique(self.surface_nodes(surface)) for name, surface in self.surfaces().items()}
-
-    def element_sets(self) -> dict[str, Integers]:
-        """Elements by bounding cell, cubic cell and layer: the colours of the paper's Fig. 11."""
-        patch, layer = self.element_patch, self.element_layer
-        bounding_cell = self.complex.placements.bounding_cell[self.complex.patch_placement]
-        cell, cell_of_patch = np.unique(self.complex.patch_cell, axis=0, return_inverse=True)
-        sets = {f"BC_{k + 1}": np.flatnonzero(bounding_cell[patch] == k) for k in np.unique(bounding_cell).tolist()}
-        for k, (x, y, z) in enumerate(cell.tolist()):
-            sets[f"CC_{x + 1}_{y + 1}_{z + 1}"] = np.flatnonzero(cell_of_patch.ravel()[patch] == k)
-        if self.layers > 1:
-            sets |= {f"LAYER_{k + 1}": np.flatnonzero(layer == k) for k in range(self.layers)}
-        return sets
+        Raises
+        ------
+        ParameterError, ExportError
+        """
+        write_mesh_files(self, paths, pairs, progress)
 
 
 def hexahedra(wall: Wall, subdivisions: int, layers: int = 1, order: int = 1, full: bool = False) -> Mesh:
@@ -294,8 +233,3 @@ def _cells(places: Integers, levels: int, element: ElementType) -> Integers:
     )
     nodes = (places[..., np.newaxis] * levels + np.arange(levels)).reshape(len(places), -1)
     return np.asarray(nodes.take(of_patch.ravel(), axis=1).reshape(-1, len(w)))
-
-
-def _surface(parts: list[tuple[Integers, int]]) -> Surface:
-    elements = np.concatenate([elements for elements, _ in parts])
-    return Surface(elements, np.concatenate([np.full(len(elements), face) for elements, face in parts]))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import ABAQUS, require_formats
+from gyroid_cad.mesh.finite_elements.data import MeshData
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.complex import CellComplex
 
@@ -54,8 +58,40 @@ class PeriodicPairs:
             (x, y, z): (self.first[some], self.second[some]) for (x, y, z), some in zip(groups, chosen, strict=True)
         }
 
+    def write(self, *paths: str | os.PathLike[str], reference: int) -> None:
+        """Write Abaqus input that ties the pairs by ``*EQUATION``, for a deck to ``*INCLUDE``; CalculiX reads it too.
 
-def periodic_pairs(mesh: Mesh, cell_size: float) -> PeriodicPairs:
+        The second node of a pair moves as the first, and as the block is stretched between them.
+
+        Parameters
+        ----------
+        *paths : path-like
+            Ending in .inp.
+        reference : int
+            Number of a node of the user's own, which holds in its three degrees of freedom how much longer the block
+            gets along x, y and z: prescribed, they are mean strains times the block's period. The mesh's own nodes
+            are numbered from 1.
+
+        Raises
+        ------
+        ParameterError, ExportError
+        """
+        for target in require_formats(paths, [ABAQUS]):
+            with replacing(target) as temporary, temporary.open("w", encoding="ascii") as file:
+                file.writelines(self.equations(reference))
+
+    def equations(self, reference: int) -> Iterator[str]:
+        """Give the text of :meth:`write` piece by piece, for a deck of one's own."""
+        yield "*EQUATION\n"
+        together = zip(self.first.tolist(), self.second.tolist(), self.blocks.tolist(), strict=True)
+        for first, second, blocks in together:
+            for axis in range(3):
+                terms = [(second + 1, 1.0), (first + 1, -1.0), *([(reference, -blocks[axis])] if blocks[axis] else [])]
+                line = ",".join(f"{node},{axis + 1},{factor:g}" for node, factor in terms)
+                yield f"{len(terms)}\n{line}\n"
+
+
+def periodic_pairs(mesh: MeshData, cell_size: float) -> PeriodicPairs:
     """Pair the nodes on the free walls of a block of cells with those where the next block would join.
 
     Free edges that differ by whole blocks are told by their ends' integer coordinates. Where walls or cells vary, only
@@ -63,7 +99,7 @@ def periodic_pairs(mesh: Mesh, cell_size: float) -> PeriodicPairs:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : MeshData
     cell_size : float
         In mm.
     """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.common.checks import finite_numbers
-from gyroid_cad.common.files import replacing, require_writable
+from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import (
     GISMO,
     JSON,
@@ -26,12 +26,13 @@ from gyroid_cad.common.formats import (
     VOLUME_FORMATS,
     Format,
     require_format,
-    require_output,
+    require_formats,
 )
-from gyroid_cad.mesh.iga.patches import BOUNDARY_PARTS, FACE_CORNERS, VolumePatches
+from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.mesh.iga.data import BOUNDARY_PARTS, FACE_CORNERS, VolumeData
 from gyroid_cad.version import __version__
 
-__all__ = ["write_mfem_field", "write_volumes"]
+__all__ = ["write_field_files", "write_volume_files"]
 
 # MFEM's numbers of shapes (Geometry::Type).
 _SQUARE, _CUBE = 3, 5
@@ -52,63 +53,37 @@ _ARRAYS = (
 )
 
 
-def write_volumes(volumes: VolumePatches, path: str | os.PathLike[str]) -> None:
-    """Write trivariate patches; the path's ending chooses the format. The file appears whole or not at all.
-
-    - ``.mesh``: MFEM's NURBS mesh v1.0 with its patches' control points (mfem.org/mesh-formats). Attributes of
-      elements are ``patch_group`` + 1, those of the boundary the place in BOUNDARY_PARTS + 1. Knot vectors are
-      numbered by the chains of edges.
-    - ``.xml``: G+Smo's multipatch of TensorBSpline3, or of TensorNurbs3 if the weights differ, with its interfaces
-      and boundary by name.
-    - ``.json``, ``.npz``: the arrays of :class:`~gyroid_cad.mesh.iga.patches.VolumePatches` under their own names.
-
-    Parameters
-    ----------
-    volumes : VolumePatches
-    path : path-like
+def write_volume_files(
+    volumes: VolumeData, paths: Sequence[str | os.PathLike[str]], progress: Progress | None = None
+) -> None:
+    """Write trivariate patches, as :meth:`gyroid_cad.VolumePatches.write` says.
 
     Raises
     ------
-    ParameterError
-        If the ending is unknown or a file cannot be put there.
-    ExportError
-        If writing failed.
+    ParameterError, ExportError
     """
-    form = require_format("output", path, VOLUME_FORMATS)
-    with replacing(require_writable(path)) as temporary:
-        _WRITERS[form](volumes, temporary)
+    for target in require_formats(paths, VOLUME_FORMATS):
+        form = require_format("output", target, VOLUME_FORMATS)
+        with timed({}, f"write {target.name}", progress), replacing(target) as temporary:
+            _WRITERS[form](volumes, temporary)
 
 
-def write_mfem_field(volumes: VolumePatches, values: ArrayLike, path: str | os.PathLike[str]) -> None:
-    """Write a scalar field in the space of the patches as MFEM's GridFunction, for the mesh written with them.
-
-    MFEM numbers control points its own way. This file holds the field patch by patch ("NURBS_patches",
-    ``NURBSExtension::LoadSolution``), so that reading it puts every value where it belongs: a field to start from,
-    or, if the values are the control points' numbers, a dictionary between both ways of numbering.
-
-    Parameters
-    ----------
-    volumes : VolumePatches
-    values : array_like, shape (points,)
-        By control point: the coefficients of the field.
-    path : path-like
-        Ends in ``.gf``.
+def write_field_files(volumes: VolumeData, values: ArrayLike, paths: Sequence[str | os.PathLike[str]]) -> None:
+    """Write a scalar field, as :meth:`gyroid_cad.VolumePatches.write_field` says.
 
     Raises
     ------
-    ParameterError
-        If the values are not one for each control point, or a file cannot be put there.
-    ExportError
-        If writing failed.
+    ParameterError, ExportError
     """
     field = finite_numbers("values", values, "a finite number for each control point", (len(volumes.control_points),))
-    with replacing(require_output(path, [MFEM_FIELD])) as temporary, temporary.open("w", encoding="ascii") as file:
-        file.write("FiniteElementSpace\nFiniteElementCollection: NURBS\nVDim: 1\nOrdering: 0\n\nNURBS_patches\n")
-        for numbers in volumes.patch_points:
-            file.write(_lines(_u_fastest(field[numbers])[:, np.newaxis]))
+    for target in require_formats(paths, [MFEM_FIELD]):
+        with replacing(target) as temporary, temporary.open("w", encoding="ascii") as file:
+            file.write("FiniteElementSpace\nFiniteElementCollection: NURBS\nVDim: 1\nOrdering: 0\n\nNURBS_patches\n")
+            for numbers in volumes.patch_points:
+                file.write(_lines(_u_fastest(field[numbers])[:, np.newaxis]))
 
 
-def _write_mfem(volumes: VolumePatches, path: Path) -> None:
+def _write_mfem(volumes: VolumeData, path: Path) -> None:
     """Control points are homogeneous: (weight x, weight y, weight z, weight).
 
     An edge's knot vector runs from its first vertex to its second. Opposite edges of a patch must name the same one,
@@ -134,7 +109,7 @@ def _write_mfem(volumes: VolumePatches, path: Path) -> None:
             file.write(_lines(np.concatenate([points * weights, weights], axis=1)))
 
 
-def _write_gismo(volumes: VolumePatches, path: Path) -> None:
+def _write_gismo(volumes: VolumeData, path: Path) -> None:
     kind = "TensorNurbs3" if volumes.rational else "TensorBSpline3"
     with path.open("w", encoding="ascii") as file:
         file.write(f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- gyroid_cad {__version__}, lengths in mm -->\n<xml>\n')
@@ -153,7 +128,7 @@ def _write_gismo(volumes: VolumePatches, path: Path) -> None:
         file.write(" </MultiPatch>\n</xml>\n")
 
 
-def _gismo_basis(volumes: VolumePatches) -> str:
+def _gismo_basis(volumes: VolumeData) -> str:
     along = "".join(
         f'   <Basis type="BSplineBasis" index="{axis}">\n'
         f'    <KnotVector degree="{degree}">{_line(knots)}</KnotVector>\n   </Basis>\n'
@@ -166,7 +141,7 @@ def _gismo_basis(volumes: VolumePatches) -> str:
     return f'  <Basis type="TensorNurbsBasis3">\n{basis}  <weights>{weights}</weights>\n  </Basis>\n'
 
 
-def _gismo_interfaces(volumes: VolumePatches) -> NDArray[np.int64]:
+def _gismo_interfaces(volumes: VolumeData) -> NDArray[np.int64]:
     """Rows of both patches and sides, the directions u, v and w have in the second patch, and whether they agree.
 
     Across the interface itself directions count as agreeing where both sides are at the same end of their parameter
@@ -183,7 +158,7 @@ def _gismo_interfaces(volumes: VolumePatches) -> NDArray[np.int64]:
     return np.concatenate([volumes.interfaces + np.array([0, 1, 0, 1]), directions, agree], axis=1)
 
 
-def _write_json(volumes: VolumePatches, path: Path) -> None:
+def _write_json(volumes: VolumeData, path: Path) -> None:
     head = {
         "format": "gyroid_cad volumes",
         "version": 1,
@@ -205,7 +180,7 @@ def _write_json(volumes: VolumePatches, path: Path) -> None:
         file.write("\n}\n")
 
 
-def _write_npz(volumes: VolumePatches, path: Path) -> None:
+def _write_npz(volumes: VolumeData, path: Path) -> None:
     arrays = {name: getattr(volumes, name) for name in _ARRAYS}
     with path.open("wb") as file:
         np.savez_compressed(
@@ -217,7 +192,7 @@ def _write_npz(volumes: VolumePatches, path: Path) -> None:
         )
 
 
-_WRITERS: dict[Format, Callable[[VolumePatches, Path], None]] = {
+_WRITERS: dict[Format, Callable[[VolumeData, Path], None]] = {
     MFEM: _write_mfem,
     GISMO: _write_gismo,
     JSON: _write_json,
@@ -225,7 +200,7 @@ _WRITERS: dict[Format, Callable[[VolumePatches, Path], None]] = {
 }
 
 
-def _knots(volumes: VolumePatches) -> tuple[NDArray[np.float64], ...]:
+def _knots(volumes: VolumeData) -> tuple[NDArray[np.float64], ...]:
     return volumes.knots, volumes.knots, volumes.knots_across
 
 
@@ -234,7 +209,7 @@ def _u_fastest(net: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.swapaxes(net, 0, 2).reshape(-1, *net.shape[3:])
 
 
-def _patch_points(volumes: VolumePatches) -> Iterator[NDArray[np.float64]]:
+def _patch_points(volumes: VolumeData) -> Iterator[NDArray[np.float64]]:
     for numbers in volumes.patch_points:
         yield volumes.control_points[np.swapaxes(numbers, 0, 2).ravel()]
 

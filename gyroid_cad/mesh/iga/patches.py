@@ -10,32 +10,29 @@ in VTK and MFEM: round side 0, then round side 1.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.graph import connected
-from gyroid_cad.common.tables import Rows, text_table
+from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, patch_nodes, place_count
-from gyroid_cad.nurbs.volume import NurbsVolume
+from gyroid_cad.mesh.iga.data import BOUNDARY_PARTS, VolumeData
+from gyroid_cad.mesh.iga.files import write_field_files, write_volume_files
+from gyroid_cad.mesh.nodes import FREE_WALLS, patch_nodes, place_count
 from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.offset import SIDES, Wall
 
-__all__ = ["BOUNDARY_PARTS", "DEGREES_ACROSS", "FACE_CORNERS", "VolumePatches", "periodic_points", "wall_volumes"]
+__all__ = ["DEGREES_ACROSS", "VolumePatches", "periodic_points", "wall_volumes"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 DEGREES_ACROSS = (1, 3)
-BOUNDARY_PARTS = (FACE_B, FACE_A, FREE_WALLS)
-# Of faces 0 to 5, turned so that their normals point out of the patch.
-FACE_CORNERS = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]])
-FACE_CORNERS.setflags(write=False)
 
 # The face on edge k of a patch: v = -1, u = 1, v = 1, u = -1.
 _FACE_OF_EDGE = np.array([2, 1, 3, 0])
@@ -46,7 +43,7 @@ _PATCHES_AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VolumePatches:
+class VolumePatches(VolumeData):
     """All patches of a wall and how they are connected.
 
     Attributes
@@ -76,53 +73,63 @@ class VolumePatches:
         Whether the parameters that run along the shared side wall rise the same way in both patches.
     boundary : ndarray of int, shape (faces, 3)
         Faces that bound the wall: patch, face, index into BOUNDARY_PARTS.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> volumes = Lattice(cells=(1, 1, 1), cell_size=10, thickness=0.8).volumes(degree=3)
+    >>> len(volumes), volumes.degrees
+    (24, (3, 3, 3))
     """
 
-    control_points: Floats
-    patch_points: Integers
-    weights: Floats
-    knots: Floats
-    knots_across: Floats
-    patch_group: Integers
-    patch_vertices: Integers
-    edges: Integers
-    edge_chain: Integers
-    interfaces: Integers
-    interface_alike: Booleans
-    boundary: Integers
+    def write(self, *paths: str | os.PathLike[str], progress: Progress | None = None) -> None:
+        """Write files; each path's ending chooses the format. A file appears whole or not at all.
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
+        - ``.mesh``: MFEM's NURBS mesh v1.0 with its patches' control points (mfem.org/mesh-formats). Attributes of
+          elements are ``patch_group`` + 1, those of the boundary the place in BOUNDARY_PARTS + 1. Knot vectors are
+          numbered by the chains of edges.
+        - ``.xml``: G+Smo's multipatch of TensorBSpline3, or of TensorNurbs3 if the weights differ, with its interfaces
+          and boundary by name.
+        - ``.json``, ``.npz``: the arrays of this class under their own names.
 
-    def rows(self) -> Rows:
-        """Subject and finding, line by line, as they are printed."""
-        return [
-            ("patches", f"{len(self):,} of degrees {', '.join(map(str, self.degrees))}"),
-            ("control points", f"{len(self.control_points):,}"),
-            ("interfaces", f"{len(self.interfaces):,}"),
-        ]
+        Parameters
+        ----------
+        *paths : path-like
+            All are checked before any is written.
+        progress : callable, optional
+            Called with (stage, done, total).
 
-    def __str__(self) -> str:
-        return text_table(self.rows())
+        Raises
+        ------
+        ParameterError
+            If an ending is unknown or a file cannot be put there.
+        ExportError
+            If writing failed.
+        """
+        write_volume_files(self, paths, progress)
 
-    def __len__(self) -> int:
-        return len(self.patch_points)
+    def write_field(self, values: ArrayLike, *paths: str | os.PathLike[str]) -> None:
+        """Write a scalar field in the space of the patches as MFEM's GridFunction, for the mesh written with them.
 
-    @property
-    def degrees(self) -> tuple[int, int, int]:
-        """Along u, v and w."""
-        along = len(self.knots) - len(self.weights) - 1
-        return along, along, int(self.weights.shape[2]) - 1
+        MFEM numbers control points its own way. This file holds the field patch by patch ("NURBS_patches",
+        ``NURBSExtension::LoadSolution``), so that reading it puts every value where it belongs: a field to start from,
+        or, if the values are the control points' numbers, a dictionary between both ways of numbering.
 
-    @property
-    def rational(self) -> bool:
-        """True where the weights differ, so that the patches are not polynomial."""
-        return bool(np.ptp(self.weights) > 0)
+        Parameters
+        ----------
+        values : array_like, shape (points,)
+            By control point: the coefficients of the field.
+        *paths : path-like
+            Ending in ``.gf``.
 
-    def patch(self, index: int) -> NurbsVolume:
-        """One patch as a volume of its own."""
-        points = self.control_points[self.patch_points[index]]
-        return NurbsVolume(points, self.weights, self.knots, self.knots, self.knots_across)
+        Raises
+        ------
+        ParameterError
+            If the values are not one for each control point, or a file cannot be put there.
+        ExportError
+            If writing failed.
+        """
+        write_field_files(self, values, paths)
 
 
 def wall_volumes(wall: Wall, degree: int = 1) -> VolumePatches:

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.mesh.triangles.measuring import canonical_edges
-from gyroid_cad.mesh.triangles.templates import Template, face_template, images, rational_basis, wall_template
+from gyroid_cad.mesh.triangles.templates import Template, face_template, wall_template
 from gyroid_cad.mesh.triangles.triangulation import Triangulation
-from gyroid_cad.nurbs.surface import basis, edge_row
+from gyroid_cad.nurbs.basis import images, rational_basis
+from gyroid_cad.nurbs.surface import edge_row
 
 __all__ = ["Corners", "FaceGroup", "face_groups", "indexed_triangles", "side_groups"]
 
@@ -104,7 +105,7 @@ class Corners:
         if group.steps not in self._matrices:
             self._matrices[group.steps] = rational_basis(
                 wall.weights, (wall.knots, wall.knots), group.template.places[first:]
-            )
+            )[0]
         matrix = self._matrices[group.steps]
 
         def inside(patches: Integers) -> Singles:
@@ -167,14 +168,13 @@ class Corners:
         """
         rows = np.unique(self._edge_rows[self._triangulation.edge_steps == steps])
         table = np.empty((len(rows), 2, steps - 1, 3))
-        functions = basis(self._wall.knots, 3, np.linspace(-1, 1, steps + 1)[1:-1])
+        places = np.linspace(-1, 1, steps + 1)[1:-1, np.newaxis]
         for k in range(4):
             some = np.flatnonzero(rows % 4 == k)
             nets = self._wall.nets[rows[some] // 4].transpose(2, 3, 0, 1, 4)
             # Knots are symmetric: an edge run backwards has the same functions.
-            weighted = functions * edge_row(self._wall.weights, k)
-            weighted /= weighted.sum(axis=1, keepdims=True)
-            table[some] = np.einsum("pn,ngsc->gspc", weighted, edge_row(nets, k))
+            functions = rational_basis(edge_row(self._wall.weights, k), (self._wall.knots,), places)[0]
+            table[some] = np.einsum("pn,ngsc->gspc", functions, edge_row(nets, k))
         return rows, _four_wide(np.stack([table, table[:, :, ::-1]]))
 
     def _placed_fans(self) -> Floats:

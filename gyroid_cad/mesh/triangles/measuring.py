@@ -15,11 +15,9 @@ from gyroid_cad.common.arrays import cross
 from gyroid_cad.mesh.triangles.templates import (
     Template,
     face_template,
-    images,
-    rational_basis,
-    rational_basis_and_rates,
     wall_template,
 )
+from gyroid_cad.nurbs.basis import images, rational_basis
 from gyroid_cad.nurbs.surface import edge_row
 from gyroid_cad.wall.offset import Wall
 
@@ -109,7 +107,7 @@ def triangulated_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers,
     # Of each case the sum of det(a, b, c) / 6, and then the vector of area.
     sums = np.zeros((len(cases), 4))
     for template, members in _by_template(cases):
-        nodes = rational_basis(wall.weights, (wall.knots, wall.knots), template.places)
+        nodes = rational_basis(wall.weights, (wall.knots, wall.knots), template.places)[0]
         for some in _portions(members, 2 * len(nodes)):
             controls = wall.nets[cases[some, 5]].reshape(2 * len(some), -1, 3)
             below, above = np.moveaxis(_sums(template, nodes, controls).reshape(-1, 2, 4), 1, 0)
@@ -120,7 +118,7 @@ def triangulated_volume(wall: Wall, patch_steps: Integers, edge_steps: Integers,
     sums = np.zeros((len(keys), 4))
     for along, weights, members in _by_weights(wall, keys):
         template = wall_template(along, across)
-        nodes = rational_basis(weights, (wall.knots, _ACROSS_KNOTS), template.places)
+        nodes = rational_basis(weights, (wall.knots, _ACROSS_KNOTS), template.places)[0]
         sums[members] = _sums(template, nodes, _rails(wall, keys[members, 1]))
     return volume + _shifted(sums[which], shifts[canonical_edges(wall, free)[0]])
 
@@ -168,7 +166,7 @@ def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) 
     rates : ndarray, shape (2, samples, controls)
         Derivatives of the surface.
     """
-    nodes = rational_basis(weights, knots, template.places)
+    nodes = rational_basis(weights, knots, template.places)[0]
     # Centroids are a third of each of three corners, middles a half of each of two.
     corners = np.concatenate([template.triangles, template.sides[:, [0, 1, 0]]])
     shares = np.concatenate(
@@ -177,7 +175,7 @@ def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) 
     for first in range(0, len(corners), _SAMPLES_AT_ONCE):
         some, share = corners[first : first + _SAMPLES_AT_ONCE], shares[first : first + _SAMPLES_AT_ONCE, :, np.newaxis]
         at, flat = (sum(values[some[:, k]] * share[:, k] for k in range(3)) for values in (template.places, nodes))
-        surface = rational_basis_and_rates(weights, knots, np.asarray(at))
+        surface = rational_basis(weights, knots, np.asarray(at), 1)
         yield flat - surface[0], surface[1:]
 
 

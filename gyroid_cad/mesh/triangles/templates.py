@@ -13,15 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.nurbs.surface import basis
 
 __all__ = [
     "FEWEST_STEPS",
     "Template",
     "face_template",
-    "images",
-    "rational_basis",
-    "rational_basis_and_rates",
     "wall_template",
 ]
 
@@ -31,8 +27,6 @@ Integers = NDArray[np.int64]
 # One place at least lies inside a patch: what the strips along its edges are stitched to.
 FEWEST_STEPS = 2
 _REMEMBERED = 256
-# Of rows, columns and length of a product.
-_ONE_THREAD = 2**18
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,68 +89,6 @@ def wall_template(along: int, across: int) -> Template:
     u, v = np.linspace(-1, 1, along + 1), np.linspace(0, 1, across + 1)
     places = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
     return _template(places, _grid_triangles(np.arange(len(places)).reshape(along + 1, across + 1)))
-
-
-def rational_basis(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
-    """Rational basis functions (The NURBS Book, eq. (4.12)) as a matrix on control points.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (n, m)
-    knots : tuple of ndarray
-        Along u and v.
-    places : ndarray, shape (places, 2)
-
-    Returns
-    -------
-    ndarray, shape (places, n m)
-    """
-    along_u, along_v = (_along(weights, knots, places, axis, 0) for axis in (0, 1))
-    weighted = _weighted(along_u, along_v, weights)
-    return np.asarray(weighted / weighted.sum(axis=1, keepdims=True))
-
-
-def rational_basis_and_rates(weights: Floats, knots: tuple[Floats, Floats], places: Floats) -> Floats:
-    """Rational basis functions and their derivatives by u and by v, by the quotient rule; shape (3, places, n m)."""
-    (u, u_rate), (v, v_rate) = ([_along(weights, knots, places, axis, k) for k in (0, 1)] for axis in (0, 1))
-    weighted = _weighted(u, v, weights)
-    total = weighted.sum(axis=1, keepdims=True)
-    result = np.empty((3, *weighted.shape))
-    result[0] = weighted / total
-    for k, rate in ((1, _weighted(u_rate, v, weights)), (2, _weighted(u, v_rate, weights))):
-        result[k] = (rate - rate.sum(axis=1, keepdims=True) * result[0]) / total
-    return result
-
-
-def _along(weights: Floats, knots: tuple[Floats, Floats], places: Floats, axis: int, derivative: int) -> Floats:
-    """Basis functions of one axis, or their derivatives; shape (places, control points along it)."""
-    degree = len(knots[axis]) - weights.shape[axis] - 1
-    return basis(knots[axis], degree, places[:, axis], derivative)
-
-
-def _weighted(along_u: Floats, along_v: Floats, weights: Floats) -> Floats:
-    products = along_u[:, :, np.newaxis] * along_v[:, np.newaxis]
-    return np.asarray((products * weights).reshape(-1, weights.size))
-
-
-def images(matrix: Floats, controls: Floats) -> Floats:
-    """Products of one matrix with the control points of many surfaces.
-
-    In portions so small that OpenBLAS keeps to one thread (``GEMM_MULTITHREAD_THRESHOLD`` in its sources): on a busy
-    machine its threads wait for each other, and products of this size take twenty times as long.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (places, controls)
-    controls : ndarray, shape (surfaces, controls, components)
-
-    Returns
-    -------
-    ndarray, shape (surfaces, places, components)
-    """
-    rows = max(1, _ONE_THREAD // (controls.shape[1] * controls.shape[2]))
-    parts = [matrix[first : first + rows] @ controls for first in range(0, len(matrix), rows)]
-    return np.concatenate(parts, axis=1) if parts else np.empty((len(controls), 0, controls.shape[2]))
 
 
 def _template(places: Floats, triangles: Integers) -> Template:

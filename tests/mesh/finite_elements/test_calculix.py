@@ -12,7 +12,6 @@ import pytest
 
 from examples.stiffness_in_calculix import CELL_SIZE, DENSITY, POISSON, YOUNG, stiffness, upper_bound
 from gyroid_cad import Lattice
-from gyroid_cad.mesh.finite_elements.files import write_mesh
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
@@ -50,7 +49,7 @@ def test_a_linear_displacement_of_the_border_is_a_linear_displacement_of_all(
 ) -> None:
     # The patch test: uniform strain, so the energy is that of the whole volume at that strain.
     mesh = meshes[kind]
-    write_mesh(mesh, tmp_path / "mesh.inp")
+    mesh.write(tmp_path / "mesh.inp")
     strain = 1e-3
     border = np.unique(np.concatenate(list(mesh.node_sets().values())))
     held = "".join(
@@ -69,7 +68,7 @@ def test_pressure_on_all_three_surfaces_is_balanced_and_squeezes_evenly(
     kind: str, meshes: dict[str, Mesh], tmp_path: Path
 ) -> None:
     mesh = meshes[kind]
-    write_mesh(mesh, tmp_path / "mesh.inp")
+    mesh.write(tmp_path / "mesh.inp")
     faces = sorted({(name, face + 1) for name, some in mesh.surfaces().items() for face in set(some.faces.tolist())})
     loads = "".join(f"{name}_S{face}, P{face}, 1.0\n" for name, face in faces)
     # Three nodes that hold the body as a whole and nothing else.

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gyroid_cad import Cylinder, Lattice
+from gyroid_cad import Lattice
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.maps import Cylinder
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh, hexahedra, quadrilaterals
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS
 from gyroid_cad.surface.families import USUAL

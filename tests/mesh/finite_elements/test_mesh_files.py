@@ -14,7 +14,7 @@ import pytest
 from gyroid_cad import Lattice
 from gyroid_cad.common.formats import MESH_FORMATS, listed_endings
 from gyroid_cad.errors import ExportError, ParameterError
-from gyroid_cad.mesh.finite_elements.files import require_mesh_format, write_mesh
+from gyroid_cad.mesh.finite_elements.files import require_mesh_format
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.surface.fit import FitSettings
 
@@ -30,7 +30,7 @@ EVERY = {**SOLIDS, "quad": SURFACE, "quad8": CURVED_SURFACE}
 
 def written(mesh: Mesh, folder: Path, ending: str) -> Path:
     path = folder / f"mesh{ending}"
-    write_mesh(mesh, path, LATTICE.periodic_pairs(mesh) if mesh.layers else None)
+    mesh.write(path, pairs=LATTICE.periodic_pairs(mesh) if mesh.layers else None)
     assert [file.name for file in folder.iterdir()] == [path.name]
     return path
 
@@ -100,7 +100,7 @@ def test_quadratic_meshes_come_nearer_to_the_tube_formula_at_fourth_order(gmsh: 
     fine = Lattice((1, 1, 1), 10.0, 0.9)
     errors = []
     for n in (2, 4, 8):
-        write_mesh(fine.hexahedra(n, 1, 2), tmp_path / f"{n}.msh")
+        fine.hexahedra(n, 1, 2).write(tmp_path / f"{n}.msh")
         errors.append(abs(volume_by_gmsh(gmsh, tmp_path / f"{n}.msh") / fine.exact_volume - 1))
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.5)
 
@@ -128,7 +128,7 @@ def test_pynastran_reads_nastran_decks(name: str, tmp_path: Path) -> None:
 def test_nastran_numbers_keep_ten_digits_whatever_the_scale(size: float, tmp_path: Path) -> None:
     bdf = pytest.importorskip("pyNastran.bdf.bdf")
     mesh = Lattice((1, 1, 1), size, size / 10, fit=FitSettings(6)).hexahedra(2)
-    write_mesh(mesh, tmp_path / "a.nas")
+    mesh.write(tmp_path / "a.nas")
     model = bdf.read_bdf(str(tmp_path / "a.nas"), xref=False, debug=False)
     points = np.array([model.nodes[number].xyz for number in sorted(model.nodes)])
     np.testing.assert_allclose(points, mesh.points, atol=1e-9 * size)
@@ -191,24 +191,24 @@ def test_the_elements_abaqus_knows_are_named_as_asked_for(tmp_path: Path) -> Non
 @pytest.mark.parametrize("path", ["mesh.stl", "mesh", "mesh.vtk", "mesh.INP.txt"])
 def test_an_unknown_ending_is_refused_with_those_known(path: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=re.escape(listed_endings(MESH_FORMATS))):
-        write_mesh(LINEAR, tmp_path / path)
+        LINEAR.write(tmp_path / path)
     assert not list(tmp_path.iterdir())
 
 
 def test_endings_in_capitals_are_known(tmp_path: Path) -> None:
-    write_mesh(LINEAR, tmp_path / "MESH.INP")
+    LINEAR.write(tmp_path / "MESH.INP")
 
 
 @pytest.mark.parametrize("ending", [".inp", ".cdb", ".bdf", ".nas"])
 def test_elements_of_27_nodes_are_refused_where_the_format_has_none(ending: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=rf"full = True: expected none in \{ending} files"):
-        write_mesh(FULL, tmp_path / f"mesh{ending}")
+        FULL.write(tmp_path / f"mesh{ending}")
     assert not list(tmp_path.iterdir())
 
 
 def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="existing folder"):
-        write_mesh(LINEAR, tmp_path / "none" / "mesh.inp")
+        LINEAR.write(tmp_path / "none" / "mesh.inp")
 
 
 @pytest.mark.parametrize("ending", [ending for form in MESH_FORMATS for ending in form.endings])
@@ -218,7 +218,7 @@ def test_a_full_disk_leaves_the_older_file_as_it_was(
     path = tmp_path / f"mesh{ending}"
     path.write_text("older")
     with disk_full(1000), pytest.raises(ExportError, match="was not written"):
-        write_mesh(LINEAR, path)
+        LINEAR.write(path)
     assert path.read_text() == "older"
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 

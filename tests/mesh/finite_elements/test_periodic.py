@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gyroid_cad import Cylinder, Lattice
+from gyroid_cad import Lattice
+from gyroid_cad.maps import Cylinder
 from gyroid_cad.mesh.finite_elements.hexahedra import hexahedra
 from gyroid_cad.mesh.finite_elements.periodic import periodic_pairs
 from gyroid_cad.mesh.nodes import FREE_WALLS

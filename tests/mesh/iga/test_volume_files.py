@@ -18,8 +18,7 @@ from volume_readers import SIDE_0, SIDE_1, Multipatch, Problem, u_fastest
 
 from gyroid_cad import ExportError, ParameterError
 from gyroid_cad.common.formats import VOLUME_FORMATS
-from gyroid_cad.mesh.iga.files import write_mfem_field, write_volumes
-from gyroid_cad.mesh.iga.patches import BOUNDARY_PARTS
+from gyroid_cad.mesh.iga.data import BOUNDARY_PARTS
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
 
@@ -38,7 +37,7 @@ def test_mfem_joins_the_patches_at_all_control_points_they_share(kind: str, degr
 @pytest.mark.parametrize("kind", KINDS)
 def test_opposite_edges_have_one_knot_vector_the_same_way_round_in_mfems_file(kind: str, tmp_path: Path) -> None:
     # MFEM 4.10 would turn them itself; older releases read no other file.
-    write_volumes(volumes_named(kind), tmp_path / "wall.mesh")
+    volumes_named(kind).write(tmp_path / "wall.mesh")
     lines = (tmp_path / "wall.mesh").read_text().split("\n")
 
     def section(name: str) -> list[list[int]]:
@@ -139,7 +138,7 @@ def test_gismo_evaluates_the_same_points(kind: str, tmp_path: Path) -> None:
 
 def test_parts_of_the_boundary_have_names_in_gismos_file(tmp_path: Path) -> None:
     volumes = volumes_named("uniform")
-    write_volumes(volumes, tmp_path / "wall.xml")
+    volumes.write(tmp_path / "wall.xml")
     nodes = ElementTree.parse(tmp_path / "wall.xml").getroot().findall("MultiPatch/boundary")
     counts = {node.get("name"): len((node.text or "").strip().split("\n")) for node in nodes}
     assert counts == dict(zip(BOUNDARY_PARTS, np.bincount(volumes.boundary[:, 2]).tolist(), strict=True))
@@ -148,7 +147,7 @@ def test_parts_of_the_boundary_have_names_in_gismos_file(tmp_path: Path) -> None
 def test_json_and_npz_hold_the_arrays_as_they_are(tmp_path: Path) -> None:
     volumes = volumes_named("rational")
     for ending in (".json", ".npz"):
-        write_volumes(volumes, tmp_path / f"wall{ending}")
+        volumes.write(tmp_path / f"wall{ending}")
     with np.load(tmp_path / "wall.npz") as binary:
         arrays = dict(binary)
     text = json.loads((tmp_path / "wall.json").read_text())
@@ -173,7 +172,7 @@ def test_what_json_and_npz_hold_is_the_wall_to_another_reader_of_splines(
 ) -> None:
     wall = wall_named(kind)
     path = tmp_path / f"wall{ending}"
-    write_volumes(volumes_named(kind, degree), path)
+    volumes_named(kind, degree).write(path)
     found = dict(np.load(path)) if ending == ".npz" else json.loads(path.read_text())
     along, across, middle = np.linspace(-1, 1, 9), np.linspace(0, 1, 3), slice(1, 2)
     rows = BSpline.design_matrix(along, np.array(found["knots"]), found["degrees"][0]).toarray()
@@ -192,7 +191,7 @@ def test_what_json_and_npz_hold_is_the_wall_to_another_reader_of_splines(
 def test_a_field_stands_in_mfem_where_it_stood_here(tmp_path: Path) -> None:
     volumes = volumes_named("turned", 3)
     problem = Problem(volumes, tmp_path)
-    write_mfem_field(volumes, volumes.control_points @ [1.0, 2.0, 3.0], tmp_path / "field.gf")
+    volumes.write_field(volumes.control_points @ [1.0, 2.0, 3.0], tmp_path / "field.gf")
     field = mfem.GridFunction(problem.mesh, str(tmp_path / "field.gf")).GetDataArray()
     np.testing.assert_allclose(field, problem.nodes @ [1.0, 2.0, 3.0], atol=1e-12 * CELL_SIZE)
 
@@ -202,16 +201,16 @@ def test_an_unknown_ending_is_refused_with_those_that_are_known(name: str, tmp_p
     with pytest.raises(
         ParameterError, match=r"output = .*: expected a file name ending in \.mesh, \.xml, \.json or \.npz"
     ):
-        write_volumes(volumes_named("uniform"), tmp_path / name)
+        volumes_named("uniform").write(tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_field_of_another_length_or_ending_is_refused(tmp_path: Path) -> None:
     volumes = volumes_named("uniform")
     with pytest.raises(ParameterError, match=r"values = .*a finite number for each control point"):
-        write_mfem_field(volumes, np.zeros(3), tmp_path / "field.gf")
+        volumes.write_field(np.zeros(3), tmp_path / "field.gf")
     with pytest.raises(ParameterError, match=r"output = .*ending in \.gf"):
-        write_mfem_field(volumes, np.zeros(len(volumes.control_points)), tmp_path / "field.mesh")
+        volumes.write_field(np.zeros(len(volumes.control_points)), tmp_path / "field.mesh")
 
 
 @pytest.mark.parametrize("ending", [form.endings[0] for form in VOLUME_FORMATS])
@@ -219,5 +218,5 @@ def test_a_full_disk_leaves_the_older_file_as_it_was(ending: str, tmp_path: Path
     path = tmp_path / f"wall{ending.upper()}"
     path.write_text("older")
     with disk_full(2000), pytest.raises(ExportError, match=r"wall.* was not written"):
-        write_volumes(volumes_named("uniform"), path)
+        volumes_named("uniform").write(path)
     assert [(found.name, found.read_text()) for found in tmp_path.iterdir()] == [(path.name, "older")]

@@ -10,13 +10,8 @@ from numpy.typing import NDArray
 from volume_cases import CELL_SIZE, KINDS, constant_wall, turned_placements, wall_named
 
 from gyroid_cad import FitSettings, Lattice, ParameterError
-from gyroid_cad.mesh.iga.patches import (
-    BOUNDARY_PARTS,
-    FACE_CORNERS,
-    VolumePatches,
-    periodic_points,
-    wall_volumes,
-)
+from gyroid_cad.mesh.iga.data import BOUNDARY_PARTS, FACE_CORNERS
+from gyroid_cad.mesh.iga.patches import VolumePatches, periodic_points, wall_volumes
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS, place_count
 from gyroid_cad.surface.symmetry import Placements
 from gyroid_cad.wall.complex import build_complex

@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from gyroid_cad import Cylinder, FitSettings, Lattice, fit_patch, linear
+from gyroid_cad import FitSettings, Lattice
+from gyroid_cad.fields import linear
+from gyroid_cad.maps import Cylinder
 from gyroid_cad.mesh.iga.patches import VolumePatches, wall_volumes
 from gyroid_cad.surface.families import USUAL
+from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.surface.symmetry import Placements, bounding_cell
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.offset import Wall, build_wall

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import spsolve
 
-from gyroid_cad.mesh.iga.files import write_mfem_field, write_volumes
 from gyroid_cad.mesh.iga.patches import VolumePatches
 
 Floats = NDArray[np.float64]
@@ -25,7 +24,7 @@ class Problem:
 
     def __init__(self, volumes: VolumePatches, folder: Path, refinements: int = 0) -> None:
         self.volumes, self.folder = volumes, folder
-        write_volumes(volumes, folder / "wall.mesh")
+        volumes.write(folder / "wall.mesh")
         self.mesh = mfem.Mesh(str(folder / "wall.mesh"))
         for _ in range(refinements):
             self.mesh.UniformRefinement()
@@ -45,7 +44,7 @@ class Problem:
 
     def numbers(self) -> NDArray[np.int64]:
         """Our numbers of MFEM's control points."""
-        write_mfem_field(self.volumes, np.arange(len(self.volumes.control_points)), self.folder / "numbers.gf")
+        self.volumes.write_field(np.arange(len(self.volumes.control_points)), self.folder / "numbers.gf")
         return mfem.GridFunction(self.mesh, str(self.folder / "numbers.gf")).GetDataArray().astype(np.int64)
 
     def integral(self, degree: int = 9) -> float:
@@ -91,7 +90,7 @@ class Multipatch:
     """A multipatch file as G+Smo reads it, with its own numbering of the degrees of freedom."""
 
     def __init__(self, volumes: VolumePatches, folder: Path) -> None:
-        write_volumes(volumes, folder / "wall.xml")
+        volumes.write(folder / "wall.xml")
         self.patches = pygismo.core.gsMultiPatch()
         pygismo.io.gsReadFile(str(folder / "wall.xml"), self.patches)
         self.bases = pygismo.core.gsMultiBasis(self.patches)

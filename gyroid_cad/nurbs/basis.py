@@ -1,0 +1,186 @@
+"""B-spline basis functions, rational ones, and how quotients of B-splines are differentiated.
+
+Algorithms after Piegl and Tiller, The NURBS Book (2nd ed.); numbers such as A2.2 are theirs. All others than this room
+ask for points and derivatives of :mod:`gyroid_cad.nurbs.surface` and :mod:`gyroid_cad.nurbs.volume`, or for the
+matrices of functions made here: nobody else evaluates a B-spline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache, reduce
+from itertools import product
+from math import comb, prod
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["basis", "gauss_points", "images", "orders", "quotients", "rational_basis", "uniform_knots"]
+
+Floats = NDArray[np.float64]
+Order = tuple[int, ...]
+
+# Of rows, columns and length of a product.
+_ONE_THREAD = 2**18
+
+
+def uniform_knots(control_points: int, degree: int = 3) -> Floats:
+    """Clamped knot vector on [-1, 1] with evenly spaced inner knots; shape (control_points + degree + 1,)."""
+    inner = np.linspace(-1.0, 1.0, control_points - degree + 1)
+    return np.concatenate([np.full(degree, -1.0), inner, np.full(degree, 1.0)])
+
+
+def basis(knots: Floats, degree: int, parameters: ArrayLike, derivative: int = 0) -> Floats:
+    """B-spline basis functions, or a derivative of them (A2.2, eq. (2.9)), for all parameters at once.
+
+    Parameters
+    ----------
+    knots : ndarray, shape (n + degree + 1,)
+        Clamped.
+    degree : int
+    parameters : array_like, shape (m,)
+    derivative : int
+        Order of the derivative; 0 gives the functions themselves.
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+    """
+    x = np.atleast_1d(np.asarray(parameters, float))
+    count = len(knots) - degree - 1
+    if derivative > degree:
+        return np.zeros((len(x), count))
+    span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
+    functions = np.zeros((len(x), len(knots) - 1))
+    functions[np.arange(len(x)), span] = 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for p in range(1, degree + 1):
+            width = knots[p:] - knots[:-p]
+            inverse = np.where(width > 0, 1 / width, 0.0)
+            if p > degree - derivative:
+                scaled = p * functions * inverse
+                functions = scaled[:, :-1] - scaled[:, 1:]
+            else:
+                scaled = functions * inverse
+                rising = (x[:, np.newaxis] - knots[: -p - 1]) * scaled[:, :-1]
+                falling = (knots[p + 1 :] - x[:, np.newaxis]) * scaled[:, 1:]
+                functions = rising + falling
+    return functions
+
+
+@lru_cache
+def _gauss_rule(count: int) -> tuple[Floats, Floats]:
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return nodes, weights
+
+
+def gauss_points(knots: Floats, per_span: int) -> tuple[Floats, Floats]:
+    """Gauss-Legendre points and weights on every span of a knot vector.
+
+    Parameters
+    ----------
+    knots : ndarray
+    per_span : int
+        Exact for polynomials of degree ``2 per_span - 1`` on each span.
+
+    Returns
+    -------
+    points, weights : ndarray, shape (spans * per_span,)
+    """
+    nodes, weights = _gauss_rule(per_span)
+    breaks = np.unique(knots)
+    half = np.diff(breaks)[:, np.newaxis] / 2
+    middle = (breaks[1:, np.newaxis] + breaks[:-1, np.newaxis]) / 2
+    return (middle + half * nodes).ravel(), (half * weights).ravel()
+
+
+@lru_cache
+def orders(highest: int, parameters: int) -> tuple[Order, ...]:
+    """Orders of derivatives by each of some parameters, up to a total, lower ones first.
+
+    Examples
+    --------
+    >>> orders(2, 2)
+    ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    """
+    every = (order for order in product(range(highest + 1), repeat=parameters) if sum(order) <= highest)
+    return tuple(sorted(every, key=lambda order: (sum(order), [-along for along in order])))
+
+
+def quotients(values: Mapping[Order, Floats], weights: Mapping[Order, Floats]) -> dict[Order, Floats]:
+    """Derivatives of A / w from those of A and of w, by the product rule on A = w (A / w) (A4.2, A4.4).
+
+    Parameters
+    ----------
+    values, weights : mapping of order to ndarray
+        Of A and w, by the orders of their derivatives; lower ones first, as :func:`orders` gives them.
+
+    Returns
+    -------
+    dict of order to ndarray
+    """
+    found: dict[Order, Floats] = {}
+    for order, value in values.items():
+        rest = value
+        for lower in product(*(range(k + 1) for k in order)):
+            if any(lower):
+                left = tuple(k - i for k, i in zip(order, lower, strict=True))
+                rest = rest - prod(map(comb, order, lower)) * weights[lower] * found[left]
+        found[order] = rest / weights[(0,) * len(order)]
+    return found
+
+
+def rational_basis(weights: Floats, knots: tuple[Floats, ...], places: Floats, order: int = 0) -> Floats:
+    """Rational basis functions (eqs. (4.2), (4.12)) and their derivatives, as matrices on control points.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n,), (n, m) or (n, m, k)
+        Of a curve, a surface or a volume.
+    knots : tuple of ndarray
+        Along each parameter.
+    places : ndarray, shape (places, parameters)
+    order : int
+        Highest total order of derivatives wanted.
+
+    Returns
+    -------
+    ndarray, shape (orders, places, control points)
+        In the order of :func:`orders`.
+
+    Examples
+    --------
+    >>> rational_basis(np.ones(4), (uniform_knots(4),), np.array([[0.0]]))
+    array([[[0.125, 0.375, 0.375, 0.125]]])
+    """
+    along = [
+        [basis(k, len(k) - count - 1, x, derivative) for derivative in range(order + 1)]
+        for k, count, x in zip(knots, weights.shape, places.T, strict=True)
+    ]
+    values, sums = {}, {}
+    for each in orders(order, weights.ndim):
+        functions = [along[axis][derivative] for axis, derivative in enumerate(each)]
+        products = reduce(lambda a, b: (a[:, :, np.newaxis] * b[:, np.newaxis]).reshape(len(a), -1), functions)
+        values[each] = products * weights.ravel()
+        sums[each] = values[each].sum(axis=1, keepdims=True)
+    return np.stack(list(quotients(values, sums).values()))
+
+
+def images(matrix: Floats, controls: Floats) -> Floats:
+    """Points of many surfaces: products of one matrix of basis functions with the control points of each.
+
+    In portions so small that OpenBLAS keeps to one thread (``GEMM_MULTITHREAD_THRESHOLD`` in its sources): on a busy
+    machine its threads wait for each other, and products of this size take twenty times as long.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (places, controls)
+    controls : ndarray, shape (surfaces, controls, components)
+
+    Returns
+    -------
+    ndarray, shape (surfaces, places, components)
+    """
+    rows = max(1, _ONE_THREAD // (controls.shape[1] * controls.shape[2]))
+    parts = [matrix[first : first + rows] @ controls for first in range(0, len(matrix), rows)]
+    return np.concatenate(parts, axis=1) if parts else np.empty((len(controls), 0, controls.shape[2]))

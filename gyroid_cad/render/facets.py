@@ -145,7 +145,8 @@ def facets_of_grids(
     for part in corners:
         part[backwards] = part[backwards, ::-1]
     faces = np.repeat(np.arange(len(points)), len(flat) // max(len(points), 1))
-    return Facets(*corners, faces=faces, surfaces=np.full(len(flat), surface), closed=closed)
+    where, upright, coloured = corners
+    return Facets(where, upright, coloured, faces=faces, surfaces=np.full(len(flat), surface), closed=closed)
 
 
 def facets_of_triangles(

@@ -21,7 +21,7 @@ from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
+from gyroid_cad.filling.infill import Infill, block_infill, endless_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.host_shapes import HostShapes
@@ -288,6 +288,8 @@ def fill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
     )
     whole = part_of(part)
+    if lattice is None:
+        require_cover(whole.low, whole.high, size, (fit or FitSettings()).control_points)
     hollow = None if shell is None else _hollowed(whole, shell, openings)
     core = whole if hollow is None else hollow.core
     filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)

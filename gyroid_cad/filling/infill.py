@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field
@@ -31,13 +32,15 @@ from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Infill", "block_infill", "endless_infill"]
+__all__ = ["Infill", "block_infill", "endless_infill", "require_cover"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 _BLOCK_SAMPLES = 13
+# Peak memory of filling and writing, for each cell of the box round a part, as measured, rounded up.
+_BYTES_PER_CELL = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,6 +165,32 @@ def endless_infill(
     if refit is not None:
         min_thickness, max_thickness = min(min_thickness, refit.min_thickness), max(max_thickness, refit.max_thickness)
     return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
+
+
+def require_cover(low: Floats, high: Floats, cell_size: float, control_points: int) -> None:
+    """Check that there is memory for the cells that cover a part, before any of them is made.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (3,)
+        Corners of the box round the part, in mm.
+    cell_size : float
+        In mm.
+    control_points : int
+        Of a patch, along a side.
+
+    Raises
+    ------
+    ParameterError
+        Saying how many cells that would be, and which size would do.
+    """
+    count = float(np.prod(np.maximum((high - low) / cell_size, 1)))
+    each = _BYTES_PER_CELL * max(1.0, (control_points / 10) ** 2)
+
+    def accepted(left: int) -> str:
+        return f"at least about {cell_size * (count * each / max(left, each)) ** (1 / 3):.3g} mm for this part"
+
+    require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
 
 
 def block_infill(lattice: Lattice, frame: Frame) -> Infill:

@@ -47,7 +47,8 @@ class Lattice(LatticeParameters, HostShapes):
 
     Whatever may vary is given as a number, an expression of x, y and z such as "0.8 + 0.02*x", a
     :class:`~gyroid_cad.fields.Field`, or a function of three arrays. x, y and z are places on the mid-surface, in mm,
-    before anything is moved.
+    in the lattice's own coordinates: before the scale field or the map moves anything, and before the finished lattice
+    is placed by ``rotation`` and ``origin``.
 
     Parameters
     ----------
@@ -78,6 +79,10 @@ class Lattice(LatticeParameters, HostShapes):
         Of a trimmed lattice: keep every piece that the cut leaves unconnected. If not, small ones are dropped, which
         have less than a hundredth of what one cell holds, and of the largest piece. The report counts what is left or
         dropped, and an :class:`~gyroid_cad.IslandsWarning` says so.
+    origin, rotation : tuple of float
+        Where the finished lattice is placed: it is turned about the axes x, y, z, one after the other, in degrees,
+        about its own origin, which then stands at ``origin``, in mm; as :func:`~gyroid_cad.fill` has it. Fields and
+        maps turn and move with it.
 
     Raises
     ------
@@ -304,7 +309,7 @@ class Lattice(LatticeParameters, HostShapes):
 
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
-        return periodic_pairs(mesh, self.cell_size)
+        return periodic_pairs(mesh, self.cell_size, self.spec().frame.rotation)
 
     def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.

@@ -52,11 +52,10 @@ class Assembly:
 
     def places(self) -> Iterator[Place]:
         """Name, ``CC_i_j_k`` counted from 1, and translation in mm of every cell."""
+        axes = self.cell.fitted.spec.frame.rotation
         for x, y, z in np.ndindex(self.cells):
-            yield (
-                f"{PART_NAME}_{x + 1}_{y + 1}_{z + 1}",
-                (x * self.cell_size, y * self.cell_size, z * self.cell_size),
-            )
+            a, b, c = (axes @ np.array([x, y, z]) * self.cell_size).tolist()
+            yield f"{PART_NAME}_{x + 1}_{y + 1}_{z + 1}", (a, b, c)
 
     def part(self) -> NamedPart:
         """The cell with names and colours of its faces.

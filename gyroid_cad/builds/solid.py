@@ -54,7 +54,7 @@ class Build:
     islands : Islands
         Of a lattice that was cut.
     shift : tuple of float
-        Of the lattice in its box, in mm, where it could not be cut without.
+        Of the lattice in its box, along its own axes, in mm, where it could not be cut without.
     seconds : dict
         By stage.
     """
@@ -102,10 +102,12 @@ class Build:
 
         spec = self.fitted.spec
         size = spec.grading.cell_size
-        box = Box(np.eye(3), np.zeros(3), np.array(self.cells) * size)
+        axes = spec.frame.rotation
+        low = spec.frame.origin @ axes
+        box = Box(axes, low, low + np.array(self.cells) * size)
         with self.timed("cut", progress):
             # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
-            left = cut_to_box(self.fitted.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True)
+            left = cut_to_box(self.fitted.wall.moved(np.eye(3), axes @ shift), box, [(0, True), (1, False)], size, True)
         with self.timed("solid", progress):
             solids = build_trimmed(left)
         volumes = left.volumes.tolist()

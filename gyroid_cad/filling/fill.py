@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from gyroid_cad.builds.solid import require_settings, write_shape
 from gyroid_cad.common.arrays import Point
@@ -35,7 +34,7 @@ from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.islands import Islands, island_rule
-from gyroid_cad.wall.covering import Frame
+from gyroid_cad.wall.covering import Frame, frame_of
 from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 
@@ -258,7 +257,7 @@ def fill(
         Largest deviation in cell sizes of a graded wall; 1e-4 if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness, density and surface are its own.
+        size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
@@ -274,7 +273,7 @@ def fill(
         If the kernel fails, or gives something that is not closed, not valid, or of the wrong volume; or cannot
         offset the part by its skin.
     """
-    frame = Frame(three_numbers("origin", origin), _turn(three_numbers("rotation", rotation)))
+    frame = frame_of(three_numbers("origin", origin), three_numbers("rotation", rotation))
     grams = None if material_density is None else positive_number("material_density", material_density) / 1000
     shell = None if skin is None else positive_number("skin", skin, "a length in mm, a finite number above 0")
     if openings and shell is None:
@@ -387,9 +386,3 @@ def _reported(
         seconds=dict(filling.seconds),
     )
     return Filled(shapes, report)
-
-
-def _turn(degrees: Floats) -> Floats:
-    """Turns about x, then y, then z."""
-
-    return np.asarray(Rotation.from_euler("xyz", degrees, degrees=True).as_matrix())

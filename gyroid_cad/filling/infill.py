@@ -200,9 +200,10 @@ def block_infill(lattice: Lattice, frame: Frame) -> Infill:
     ----------
     lattice : Lattice
     frame : Frame
-        Where the lattice's own origin stands.
+        That the lattice is placed by, wherever it stands in its own space.
     """
-    fitted = lattice.fitted()
+    fitted = lattice.fitted().at_home()
+    frame = lattice.spec().frame.within(frame)
     wall = fitted.wall.moved(frame.rotation, frame.origin)
     return Infill(frame, fitted.spec.grading, fitted.complex, wall, fitted.min_thickness, fitted.max_thickness, False)
 

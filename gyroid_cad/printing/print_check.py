@@ -270,7 +270,7 @@ def _check_lattice(
     opening = (
         pore_limiting_diameter(grading.surface, grading.cell_size, fitted.min_thickness)
         if grading.uniform
-        else narrowest_opening(fitted.wall, grading, lattice.cells)
+        else narrowest_opening(fitted.at_home().wall, grading, lattice.cells)
     )
     if fitted.spec.trimmed:
         limit = min(lattice.cell_size / 1000, fitted.min_thickness / 10) if deviation is None else deviation

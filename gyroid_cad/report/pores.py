@@ -177,6 +177,8 @@ def inscribed_spheres(fitted: FittedWall) -> tuple[Floats, Floats, Integers]:
 
 def _scene(fitted: FittedWall) -> tuple[_Grid, WallFaces, str]:
     """Scene of the pores: the region looked at, the walls, and what there is beyond the block's sides."""
+    # Where its fields and maps are.
+    fitted = fitted.at_home()
     grading, wall = fitted.spec.grading, fitted.wall
     if grading.uniform:
         return _grid(fitted, 0.0), wall_faces(wall, grading.cell_size), ENDLESS

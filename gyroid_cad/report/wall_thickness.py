@@ -136,6 +136,8 @@ def wall_thickness(fitted: FittedWall) -> WallThickness:
     -------
     WallThickness
     """
+    # As the exact surface knows it.
+    fitted = fitted.at_home()
     grading, wall = fitted.spec.grading, fitted.wall
     patches, _ = distinct_patches(fitted.wall)
     along = int(np.clip(np.sqrt(_MEASURED / len(patches)), _FEWEST_MEASURED, _MOST_MEASURED))

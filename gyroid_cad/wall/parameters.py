@@ -10,7 +10,8 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from gyroid_cad.common.checks import finite_number, positive_number
+from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import TRIMS, SurfaceName, Trim
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
@@ -22,7 +23,7 @@ from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import LatticeSpec
+from gyroid_cad.wall.fitted import HOME, LatticeSpec
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.limits import (
     require_cell_size,
@@ -61,6 +62,8 @@ class LatticeParameters:
     trim: Trim | None = None
     surface: SurfaceName = "gyroid"
     keep_islands: bool = False
+    origin: Point = HOME
+    rotation: Point = HOME
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -75,6 +78,9 @@ class LatticeParameters:
         if self.map is not None:
             object.__setattr__(self, "map", as_map(self.map))
         surface_named(self.surface)
+        for name in ("origin", "rotation"):
+            x, y, z = three_numbers(name, getattr(self, name)).tolist()
+            object.__setattr__(self, name, (x, y, z))
         self._require_fit()
         self._require_trim()
         if not self.uniform:
@@ -94,6 +100,8 @@ class LatticeParameters:
         fit: FitSettings | None = None,
         tolerance: float | None = None,
         surface: SurfaceName = "gyroid",
+        origin: Point = HOME,
+        rotation: Point = HOME,
     ) -> Self:
         """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
 
@@ -107,7 +115,7 @@ class LatticeParameters:
             In BC units: a place p is moved to bc_length(p) p.
         scale : float
             Millimetres per unit of BC length.
-        fit, tolerance, surface
+        fit, tolerance, surface, origin, rotation
             As of :class:`Lattice`.
 
         Raises
@@ -123,6 +131,8 @@ class LatticeParameters:
             scale_field=given.scale_field,
             tolerance=tolerance,
             surface=surface,
+            origin=origin,
+            rotation=rotation,
         )
 
     @property
@@ -168,7 +178,16 @@ class LatticeParameters:
             settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
         tolerance = self.tolerance or USUAL_TOLERANCE
         trimmed = self.trim is not None
-        return LatticeSpec(self.cells, self.grading(), settings, tolerance, trimmed, self.keep_islands)
+        return LatticeSpec(
+            self.cells,
+            self.grading(),
+            settings,
+            tolerance,
+            trimmed,
+            self.keep_islands,
+            self.origin,
+            self.rotation,
+        )
 
     def grading(self) -> Grading:
         """Return how wall and space vary, or that they do not."""

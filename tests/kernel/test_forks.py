@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from gyroid_cad.kernel.check import is_valid
-from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.kernel.stl import write_meshed_stl
 from gyroid_cad.lattice import Lattice

@@ -41,7 +41,7 @@ ROW = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
 EXCEPTIONS: dict[tuple[str, str], str] = {}
 # Which rooms or modules may load a heavy package.
 OWNERS = {
-    "OCP": ("kernel.",),
+    "OCP": ("kernel",),
     "cadquery": ("cq_plugin", "cli.viewer", "host_shapes"),
     "build123d": ("bd_objects", "host_shapes"),
     # CadQuery's viewer is made of it, and distances to triangles are asked of it.

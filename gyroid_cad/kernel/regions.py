@@ -84,7 +84,7 @@ def _can_fork() -> bool:
 
 
 def _found_here(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
-    """What is found in each region, one after the other."""
+    """Pieces found in each region, one after the other."""
     found, done = [], 0
     for region in task.regions:
         found.append(_found_in(task, region))
@@ -99,7 +99,7 @@ _inherited: list[Task] = []
 
 
 def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
-    """What is found in each region."""
+    """Pieces found in each region, several at a time."""
     before = multiprocessing.active_children()
     executor = ProcessPoolExecutor(
         min(processes, len(task.regions)),
@@ -125,6 +125,7 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
         for process in multiprocessing.active_children():
             if process not in before:
                 process.kill()
+                process.join()
         if isinstance(problem, RuntimeError | OSError) and not isinstance(problem, KernelError):
             raise KernelError(f"no processes could be started to split the part: {problem}") from problem
         raise

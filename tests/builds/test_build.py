@@ -87,7 +87,7 @@ def test_a_wall_that_varies_is_checked_before_it_is_fitted_and_measured_after() 
 @pytest.mark.usefixtures("forgotten")
 def test_the_control_points_a_varying_wall_takes_are_asked_of_memory_again(monkeypatch: pytest.MonkeyPatch) -> None:
     requested: list[int] = []
-    monkeypatch.setattr(fitted, "require_memory", lambda cells, size, n=10: requested.append(n))
+    monkeypatch.setattr(fitted, "require_memory", lambda cells, size, n=10, **_: requested.append(n))
     made = build_module.build(LatticeSpec(CELLS, Grading(10.0, linear(0.6, x=0.02)), COARSE, 1e-4))
     assert requested[0] == 4 < requested[-1] == len(made.fitted.wall.weights)
 

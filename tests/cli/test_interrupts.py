@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import cadquery
@@ -116,10 +117,11 @@ def splitting(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]
     end, workers = time.monotonic() + PATIENCE, []
     while run.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
-        workers = [child for child in psutil.Process(run.pid).children() if child.name() == psutil.Process().name()]
-        # What reads the part is a program of its own, and is there before.
-        if workers and all("fill" in child.cmdline() for child in workers):
-            return run, workers
+        # What reads the part is a program of its own, and is there before, or about to end.
+        with suppress(psutil.Error):
+            workers = [child for child in psutil.Process(run.pid).children() if "fill" in child.cmdline()]
+            if workers:
+                return run, workers
     run.kill()
     run.communicate()
     pytest.skip("one processor: nothing is split in processes")

@@ -28,6 +28,8 @@ __all__ = ["FitReport", "fit_report", "fit_within"]
 _REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
 _FOOT_POINT_STEPS = 4
+# Less than this is rounding, of which the digits differ from machine to machine.
+_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ class FitReport:
             "gap between an edge and its neighbour's / L": self.edge_gap,
             "corners off by / L": self.corner_error,
         }
-        return [(subject, f"{value:.2e}") for subject, value in found.items()]
+        return [(subject, "< 1e-15" if value < _ROUNDING else f"{value:.2e}") for subject, value in found.items()]
 
     def __str__(self) -> str:
         return text_table(self.rows())

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.builds.solid import require_settings, write_shape
+from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
@@ -35,8 +35,7 @@ from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.islands import Islands, island_rule
 from gyroid_cad.wall.covering import Frame, frame_of
-from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
-from gyroid_cad.wall.parameters import USUAL_TOLERANCE
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
 
 __all__ = ["FillReport", "Filled", "fill"]
 

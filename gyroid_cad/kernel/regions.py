@@ -21,14 +21,34 @@ from contextlib import contextmanager, suppress
 from OCP.Standard import Standard_OutOfMemory
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.common.processes import end_with_parent
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.region_merge import Joining
 from gyroid_cad.kernel.region_split import Found, RegionSplit, Task
 from gyroid_cad.kernel.split import Pieces, split
 
-__all__ = ["split_by_region"]
+__all__ = ["end_with_parent", "split_by_region"]
+
+# Of prctl(2): the signal that a process gets when the one that started it ends.
+_SET_SIGNAL_AT_PARENTS_END = 1
+
+
+def end_with_parent(parent: int) -> None:
+    """Let the system end this process at once when its parent ends, however that ends (Linux; elsewhere nothing).
+
+    Parameters
+    ----------
+    parent : int
+        Its number, as ``os.getpid`` gives it there: it may have ended already.
+    """
+    if sys.platform != "linux":
+        return
+    import ctypes  # not needed by those who never start a process
+
+    ctypes.CDLL(None).prctl(_SET_SIGNAL_AT_PARENTS_END, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
 
 # With fewer faces, starting processes is not worth it.
 _FEW = 64

@@ -12,6 +12,8 @@ import numpy as np
 from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, Format, require_format
 from gyroid_cad.common.inputs import unreadable
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.mesh.triangles.files import read_triangles
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
 __all__ = ["FileContents", "file_section", "read_contents"]
@@ -88,8 +90,6 @@ def _shape_of(path: Path, form: Format) -> FileContents:
 
 
 def _triangles_of(path: Path, form: Format) -> FileContents:
-    from gyroid_cad.mesh.triangles.files import read_triangles
-    from gyroid_cad.mesh.triangles.measures import triangle_measures
 
     vertices, triangles = read_triangles(path)
     found = triangle_measures(vertices, triangles)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.sparse import csr_array
 
 from gyroid_cad.wall.distances import Feet, WallFaces, tree_of
 
@@ -54,8 +56,6 @@ def _best_steps(feet: Feet, reach: Floats) -> tuple[Floats, Floats]:
 
     The programmes of all centres are solved as one: nothing joins them but that their gains are added.
     """
-    from scipy.optimize import linprog
-    from scipy.sparse import csr_array
 
     count = len(feet.distance)
     nearest = np.arange(_TOUCHING) == np.argmin(feet.distance, axis=1)[:, np.newaxis]

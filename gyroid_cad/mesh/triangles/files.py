@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import BadZipFile, ZipFile
 
+import lib3mf
 import numpy as np
 from numpy.typing import NDArray
 
@@ -107,7 +108,6 @@ def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, B
 
 def _read_3mf(path: Path) -> tuple[Floats, Integers]:
     """Meshes of all parts that are to be built, each where it stands on the platform."""
-    import lib3mf
 
     _require_bounded_archive(path)
     wrapper = lib3mf.get_wrapper()
@@ -155,7 +155,6 @@ def _array(structures: Any, kind: str) -> NDArray[Any]:
 
 
 def _millimetres(unit: Any) -> float:
-    import lib3mf
 
     sizes = {
         lib3mf.ModelUnit.MicroMeter: 1e-3,

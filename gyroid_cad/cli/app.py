@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
 import warnings
@@ -21,6 +22,8 @@ __all__ = ["answered_shell", "commands", "completion_command", "main"]
 _SHELLS = ("bash", "zsh", "fish")
 # As click makes it of the program's name.
 _VARIABLE = "_{}_COMPLETE"
+# How what no text can say is encoded.
+_AS_NAMED = "gyroid_cad.as_named"
 
 
 @click.command("completion")
@@ -108,6 +111,14 @@ def commands() -> None:
     """
 
 
+def _as_named(problem: UnicodeError) -> tuple[str | bytes, int]:
+    """Print bytes of a file's name that are no text as they are, and letters that the terminal lacks escaped."""
+    try:
+        return codecs.lookup_error("surrogateescape")(problem)
+    except UnicodeError:
+        return codecs.lookup_error("backslashreplace")(problem)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -123,8 +134,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     session = Session()
     if isinstance(sys.stdout, TextIOWrapper):
-        # A file's name may hold what the terminal has no letters for.
-        sys.stdout.reconfigure(errors="backslashreplace")
+        codecs.register_error(_AS_NAMED, _as_named)
+        sys.stdout.reconfigure(errors=_AS_NAMED)
     try:
         if (answered := answered_shell(commands, PROGRAM)) is not None:
             return answered

@@ -88,3 +88,9 @@ def test_a_name_that_is_not_text_is_printed_as_it_is(tmp_path: Path) -> None:
     run = subprocess.run(["bash", "-c", command], capture_output=True, check=True)
     assert b"caf\xe9.step" in run.stdout
     assert os.path.exists(os.fsencode(tmp_path) + b"/caf\xe9.step")
+
+
+def test_letters_that_the_terminal_lacks_are_escaped(tmp_path: Path) -> None:
+    run = in_shell(tmp_path, "", *BUILD, "-o", "naïve.step", PYTHONIOENCODING="ascii")
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "na\\xefve.step" in run.stdout

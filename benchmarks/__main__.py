@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from benchmarks import (
     accuracy,
     assembly,
+    commands,
     filling,
     grading,
     memory,
@@ -38,6 +39,7 @@ BENCHMARKS = (
     solid_against_sewing,
     memory,
     triangles,
+    commands,
 )
 
 

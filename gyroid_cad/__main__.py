@@ -34,10 +34,8 @@ def keep_standard_output() -> None:
     ours, theirs = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(theirs, 1)
     os.close(theirs)
-    # Names of files are printed as they are, whatever bytes they are made of.
-    errors = "surrogateescape" if sys.stdout.errors == "strict" else sys.stdout.errors
     line = 1 if os.isatty(ours) else -1
-    sys.stdout = os.fdopen(ours, "w", buffering=line, encoding=sys.stdout.encoding, errors=errors)
+    sys.stdout = os.fdopen(ours, "w", buffering=line, encoding=sys.stdout.encoding, errors=sys.stdout.errors)
 
 
 if __name__ == "__main__":

@@ -77,7 +77,8 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
             surface,
             keep_islands=keep_islands,
         )
-        part = self.lattice.to_build123d()
+        # A solid where it is one, as the host's own objects begin: the place of a part would be lost in its ``locate``.
+        part = Part.cast(self.lattice.solid())
         if align is not None:
             # The host would measure the box on the kernel's faces; the control nets give it at once.
             part = part.moved(Location(to_align_offset(*self.lattice.bounding_box(), align)))

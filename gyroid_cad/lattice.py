@@ -8,15 +8,20 @@ from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING
 
-from gyroid_cad.builds.assembly import Assembly, AssemblyReport, assembly, assembly_report, require_assembly_formats
 from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
 from gyroid_cad.builds.report import LatticeReport, report_of
-from gyroid_cad.builds.solid import Build, build, require_settings
 from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
+from gyroid_cad.common.formats import (
+    TRIANGLE_FORMATS,
+    format_of,
+    require_assembly_formats,
+    require_formats,
+    require_meshing,
+    require_settings,
+)
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import cells_shown
 from gyroid_cad.errors import ParameterError
@@ -31,6 +36,8 @@ from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.parameters import LatticeParameters, MapLike
 
 if TYPE_CHECKING:
+    from gyroid_cad.builds.assembly import Assembly, AssemblyReport
+    from gyroid_cad.builds.solid import Build
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
@@ -47,7 +54,8 @@ class Lattice(LatticeParameters, HostShapes):
 
     Whatever may vary is given as a number, an expression of x, y and z such as "0.8 + 0.02*x", a
     :class:`~gyroid_cad.fields.Field`, or a function of three arrays. x, y and z are places on the mid-surface, in mm,
-    before anything is moved.
+    in the lattice's own coordinates: before the scale field or the map moves anything, and before the finished lattice
+    is placed by ``rotation`` and ``origin``.
 
     Parameters
     ----------
@@ -78,6 +86,10 @@ class Lattice(LatticeParameters, HostShapes):
         Of a trimmed lattice: keep every piece that the cut leaves unconnected. If not, small ones are dropped, which
         have less than a hundredth of what one cell holds, and of the largest piece. The report counts what is left or
         dropped, and an :class:`~gyroid_cad.IslandsWarning` says so.
+    origin, rotation : tuple of float
+        Where the finished lattice is placed: it is turned about the axes x, y, z, one after the other, in degrees,
+        about its own origin, which then stands at ``origin``, in mm; as :func:`~gyroid_cad.fill` has it. Fields and
+        maps turn and move with it.
 
     Raises
     ------
@@ -208,10 +220,14 @@ class Lattice(LatticeParameters, HostShapes):
         FitError, KernelError
             As of :meth:`solid`.
         """
+        from gyroid_cad.builds.assembly import assembly
+
         return assembly(self.spec(), progress)
 
     def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
         """Make the assembly if it isn't yet, and say what it is; nothing is written."""
+        from gyroid_cad.builds.assembly import assembly_report
+
         return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
@@ -304,7 +320,7 @@ class Lattice(LatticeParameters, HostShapes):
 
     def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
         """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
-        return periodic_pairs(mesh, self.cell_size)
+        return periodic_pairs(mesh, self.cell_size, self.spec().frame.rotation)
 
     def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
@@ -355,6 +371,9 @@ class Lattice(LatticeParameters, HostShapes):
 
     def built(self, progress: Progress | None = None) -> Build:
         """The build behind the solid and its files; warns of the islands that a cut leaves."""
+        # With it the kernel is loaded, which triangles and meshes do without.
+        from gyroid_cad.builds.solid import build
+
         made = build(self.spec(), progress)
         if self.trim:
             made.islands.warn()

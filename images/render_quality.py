@@ -5,13 +5,12 @@ Run from the repository's root: ``python images/render_quality.py``. It prints t
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import vtk
 from numpy.typing import NDArray
-from render import FOLDER, LINE_COLOUR, write_picture
-from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from sheet import FOLDER, Sheet, Vector, beside, mixed
 
 from gyroid_cad import Lattice
 from gyroid_cad.builds.meshes import mesh_quality
@@ -24,6 +23,8 @@ from gyroid_cad.mesh.finite_elements.quality import (
     shown_number,
 )
 from gyroid_cad.mesh.finite_elements.summaries import draw_quality
+from gyroid_cad.render.drawing import draw
+from gyroid_cad.render.facets import Facets, facets_of_grids
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 
 Floats = NDArray[np.float64]
@@ -35,14 +36,10 @@ STEPS = 20
 LAYERS = 3
 LATTICE = Lattice(cells=(2, 2, 2), cell_size=10, thickness=1)
 
-_SIZE = (1300, 600)
-_CAMERA = (-0.1, -0.4, 1.0)
-# Of the meshes' middles, in cells; and of the largest letters, in pixels.
-_APART, _LETTERS = 0.51, 22
-# Half the height of what is seen, in cells, and how far its middle lies right of and below the meshes', to leave room
-# for the bar and the captions.
-_HALF_HEIGHT, _ASIDE, _BELOW = 0.57, 0.14, 0.1
-_BAD_COLOUR, _MIDDLE_COLOUR, _GOOD_COLOUR = (0.72, 0.16, 0.12), (0.96, 0.82, 0.45), (0.24, 0.56, 0.56)
+_SIZE, _CAPTION_HEIGHT, _BAR_ROOM, _BAR_HEIGHT = (1300, 560), 60, 200, 330
+_CAMERA: Vector = (-0.1, -0.4, 1.0)
+_GAP = 0.06
+_BAD_TO_GOOD: tuple[Vector, ...] = ((0.76, 0.20, 0.16), (0.97, 0.84, 0.50), (0.30, 0.62, 0.62))
 
 
 def main() -> list[Path]:
@@ -104,88 +101,22 @@ def _print_comparison(reports: dict[str, Quality]) -> None:
 
 def render_beside(meshes: dict[str, Mesh]) -> Path:
     """Draw quadrilaterals of a patch side by side, coloured by their scaled Jacobian."""
-    renderer = vtk.vtkRenderer()
-    renderer.SetBackground(1, 1, 1)
-    towards = np.array(_CAMERA) / np.linalg.norm(_CAMERA)
-    right = np.cross((0, 0, 1), towards)
-    right /= np.linalg.norm(right)
-    colours = _colours()
-    for index, (name, (points, cells)) in enumerate(meshes.items()):
-        offset = (2 * index - len(meshes) + 1) * _APART
-        renderer.AddActor(_coloured(points + offset * right, cells, colours))
-        across = 0.5 + (offset - _ASIDE) / (2 * _HALF_HEIGHT) * _SIZE[1] / _SIZE[0]
-        renderer.AddActor(_caption(name, across))
-    renderer.AddActor(_colour_bar(colours))
-    camera = renderer.GetActiveCamera()
-    camera.SetViewUp(0, 0, 1)
-    camera.ParallelProjectionOn()
-    camera.SetParallelScale(_HALF_HEIGHT)
-    focus = _ASIDE * right - _BELOW * np.cross(towards, right)
-    camera.SetFocalPoint(*focus.tolist())
-    camera.SetPosition(*(focus + towards).tolist())
-    renderer.ResetCameraClippingRange()
-    target = FOLDER / "polar_and_smooth_mesh.png"
-    write_picture(renderer, _SIZE, target)
-    return target
+    groups = beside([[_coloured(*mesh)] for mesh in meshes.values()], _CAMERA, _GAP)
+    sheet, size = Sheet(_SIZE), (_SIZE[0] - _BAR_ROOM, _SIZE[1] - _CAPTION_HEIGHT)
+    sheet.put(draw([one for group in groups for one in group], size, _CAMERA))
+    sheet.caption(groups, list(meshes), size, _CAMERA)
+    bar = (_SIZE[0] - _BAR_ROOM + 30, (_SIZE[1] - _BAR_HEIGHT) // 2, _BAR_HEIGHT)
+    sheet.put_bar(mixed(_BAD_TO_GOOD, np.linspace(0, 1, 256)), 1.0, "scaled Jacobian", *bar)
+    return sheet.save("polar_and_smooth_mesh", many_colours=True)
 
 
-def _coloured(points: Floats, cells: Integers, colours: vtk.vtkColorTransferFunction) -> vtk.vtkActor:
-    held, polygons, mesh = vtk.vtkPoints(), vtk.vtkCellArray(), vtk.vtkPolyData()
-    held.SetData(numpy_to_vtk(points, deep=True))
-    polygons.SetData(4, numpy_to_vtkIdTypeArray(cells.ravel(), deep=True))
-    mesh.SetPoints(held)
-    mesh.SetPolys(polygons)
-    mesh.GetCellData().SetScalars(numpy_to_vtk(element_measures(points, cells)["scaled_jacobian"], deep=True))
-    mapper, actor = vtk.vtkPolyDataMapper(), vtk.vtkActor()
-    mapper.SetInputData(mesh)
-    mapper.SetLookupTable(colours)
-    actor.SetMapper(mapper)
-    actor.GetProperty().EdgeVisibilityOn()
-    actor.GetProperty().SetEdgeColor(*LINE_COLOUR)
-    actor.GetProperty().SetLineWidth(1.2)
-    actor.GetProperty().LightingOff()
-    return actor
-
-
-def _colours() -> vtk.vtkColorTransferFunction:
-    colours = vtk.vtkColorTransferFunction()
-    for value, colour in ((0, _BAD_COLOUR), (0.5, _MIDDLE_COLOUR), (1, _GOOD_COLOUR)):
-        colours.AddRGBPoint(value, *colour)
-    return colours
-
-
-def _caption(text: str, across: float) -> vtk.vtkTextActor:
-    actor = vtk.vtkTextActor()
-    actor.SetInput(text)
-    actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-    actor.SetPosition(across, 0.03)
-    letters = actor.GetTextProperty()
-    letters.SetJustificationToCentered()
-    _style(letters, _LETTERS)
-    return actor
-
-
-def _colour_bar(colours: vtk.vtkColorTransferFunction) -> vtk.vtkScalarBarActor:
-    bar = vtk.vtkScalarBarActor()
-    bar.SetLookupTable(colours)
-    bar.SetTitle("scaled Jacobian\n")
-    bar.SetNumberOfLabels(5)
-    bar.SetLabelFormat("{:.2f}")
-    bar.UnconstrainedFontSizeOn()
-    bar.SetPosition(0.9, 0.2)
-    bar.SetWidth(0.06)
-    bar.SetHeight(0.6)
-    _style(bar.GetTitleTextProperty(), _LETTERS - 4)
-    _style(bar.GetLabelTextProperty(), _LETTERS - 4)
-    return bar
-
-
-def _style(letters: vtk.vtkTextProperty, size: int) -> None:
-    letters.SetFontSize(size)
-    letters.SetColor(*LINE_COLOUR)
-    letters.BoldOff()
-    letters.ItalicOff()
-    letters.ShadowOff()
+def _coloured(points: Floats, cells: Integers) -> Facets:
+    """Quadrilaterals as faces with dark lines round them, in one light."""
+    corners = points[cells[:, [0, 1, 3, 2]]].reshape(-1, 2, 2, 3)
+    colours = mixed(_BAD_TO_GOOD, element_measures(points, cells)["scaled_jacobian"])
+    everywhere = np.broadcast_to(colours[:, np.newaxis, np.newaxis], corners.shape)
+    facets = facets_of_grids(corners, np.broadcast_to(_CAMERA, corners.shape), everywhere)
+    return replace(facets, surfaces=facets.faces)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Render solved fields, off-screen through VTK, which CadQuery brings.
+"""Render solved fields with the package's own rasteriser.
 
 Run from the repository's root after ``examples/isogeometric_heat.py`` has left its files somewhere:
 ``python images/render_solutions.py FOLDER``. Fields are evaluated on the NURBS patches they were solved on.
@@ -7,34 +7,31 @@ Run from the repository's root after ``examples/isogeometric_heat.py`` has left 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import groupby, product
 from pathlib import Path
 
 import numpy as np
-import vtk
 from numpy.typing import NDArray
-from render import FOLDER, LINE_COLOUR, write_picture
-from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from sheet import Sheet, Vector, mixed
 
 from gyroid_cad.nurbs.volume import NurbsVolume
+from gyroid_cad.render.drawing import draw
+from gyroid_cad.render.facets import Facets, facets_of_grids
+from gyroid_cad.render.picture import CAMERA
 
 Floats = NDArray[np.float64]
-Colours = tuple[tuple[float, float, float], ...]
 
-SIZE = (1400, 612)
-_CAMERA = (3, -4, 1.9)
-# From the middle of one lattice to the other's, in cells.
-_APART = 3.55
-# How much of the lattices' height the picture shows, in cells.
-_HEIGHT = 3.4
-# Points along each side of a patch, and across the wall.
-_FINENESS, _FINENESS_ACROSS = 25, 4
+_SIZE, _BAR_ROOM, _BAR_HEIGHT = (1440, 600), 120, 350
+# Steps along each side of a patch, and across the wall.
+_FINENESS, _FINENESS_ACROSS = 40, 6
 # The solved cell is repeated so often along each axis, as the solution is.
 CELLS = 2
-_COLD_TO_HOT: Colours = ((0.13, 0.29, 0.58), (0.93, 0.93, 0.88), (0.75, 0.16, 0.14))
-LITTLE_TO_MUCH: Colours = ((0.20, 0.12, 0.30), (0.76, 0.29, 0.32), (0.99, 0.88, 0.60))
-_ISOTHERMS, SHADES = 24, 256
+_COLD_TO_HOT: tuple[Vector, ...] = ((0.20, 0.38, 0.72), (0.95, 0.95, 0.90), (0.82, 0.22, 0.18))
+LITTLE_TO_MUCH: tuple[Vector, ...] = ((0.33, 0.22, 0.48), (0.85, 0.38, 0.40), (1.0, 0.90, 0.62))
+# Temperatures have a line every so many kelvins.
+_ISOTHERMS = 1 / 12
+SHADES = np.linspace(0, 1, 256)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,30 +53,59 @@ def main(folder: str) -> Path:
     corners = volumes["patch_points"][:, [0, 0, -1, -1], [0, -1, 0, -1]][..., [0, -1]]
     cell_size = float(np.ptp(volumes["control_points"][corners].mean(axis=-2)[..., 2])) / 1.5
     faces = _sampled(volumes, temperature_at_points, cell_size)
-    right = np.cross((0, 0, 1), _CAMERA) / np.hypot(*_CAMERA[:2])
-    renderer = vtk.vtkRenderer()
-    renderer.SetBackground(1, 1, 1)
-    temperature = lookup_table(_COLD_TO_HOT, (0, CELLS), _ISOTHERMS)
-    flux = lookup_table(LITTLE_TO_MUCH, (0, max(float(face.flux.max()) for face in faces)), SHADES)
-    for place in product(range(CELLS), repeat=3):
-        moved = cell_size * np.array(place, dtype=float)
-        for values, table, side in (("temperature", temperature, -0.5), ("flux", flux, 0.5)):
-            rise = place[2] if values == "temperature" else 0
-            for actor in (_surface(faces, values, rise, table), _outlines(faces)):
-                actor.SetPosition(*(moved + side * _APART * cell_size * right).tolist())
-                renderer.AddActor(actor)
-    for table, title, left in ((temperature, "K", 0.015), (flux, "K per cell", 0.945)):
-        renderer.AddViewProp(legend(table, title, left))
-    place_camera(renderer, cell_size)
-    target = FOLDER / "isogeometric_heat.png"
-    write_picture(renderer, SIZE, target)
-    return target
+    most = max(float(face.flux.max()) for face in faces)
+    temperature, flux = [], []
+    for layer in range(CELLS):
+        places = [(x, y, layer) for x, y in product(range(CELLS), repeat=2)]
+        for facets in _facets(faces, "temperature"):
+            kelvins = facets.colours[..., 0] + layer
+            lines = np.floor(kelvins.mean(axis=1) / _ISOTHERMS).astype(int)
+            # Fine lines stand where faces meet: those of one patch are its stretches between isotherms.
+            several = facets.faces * (lines.max() + 1) + lines
+            shown = replace(facets, colours=mixed(_COLD_TO_HOT, kelvins / CELLS), faces=several)
+            temperature.append(repeated(shown, np.array(places) * cell_size))
+        for facets in _facets(faces, "flux"):
+            shown = replace(facets, colours=mixed(LITTLE_TO_MUCH, facets.colours[..., 0] / most))
+            flux.append(repeated(shown, np.array(places) * cell_size))
+    sheet, size = Sheet(_SIZE), (_SIZE[0] // 2 - _BAR_ROOM, _SIZE[1])
+    sheet.put(draw(temperature, size, CAMERA), _BAR_ROOM)
+    sheet.put(draw(flux, size, CAMERA), _SIZE[0] // 2)
+    top = (_SIZE[1] - _BAR_HEIGHT) // 2
+    sheet.put_bar(mixed(_COLD_TO_HOT, SHADES), CELLS, "K", 20, top, _BAR_HEIGHT)
+    sheet.put_bar(mixed(LITTLE_TO_MUCH, SHADES), most, "K per cell", _SIZE[0] - _BAR_ROOM, top, _BAR_HEIGHT)
+    return sheet.save("isogeometric_heat", many_colours=True)
+
+
+def repeated(facets: Facets, shifts: Floats) -> Facets:
+    """Facets in several places, by their shifts, shape (k, 3)."""
+    places = np.tile(np.eye(3, 4), (len(shifts), 1, 1))
+    places[..., 3] = shifts
+    return replace(facets, places=places)
+
+
+def _facets(faces: list[_Face], values: str) -> list[Facets]:
+    """Facets of all faces, those with as many points together; values stand in place of colours."""
+    by_shape = [list(some) for _, some in groupby(sorted(faces, key=_shape), _shape)]
+    return [
+        facets_of_grids(
+            np.array([face.points for face in some]),
+            np.array([face.normals for face in some]),
+            np.repeat(np.array([getattr(face, values) for face in some])[..., np.newaxis], 3, axis=-1),
+            closed=True,
+            surface=number,
+        )
+        for number, some in enumerate(by_shape)
+    ]
+
+
+def _shape(face: _Face) -> tuple[int, ...]:
+    return face.temperature.shape
 
 
 def _sampled(volumes: dict[str, Floats], temperature: Floats, cell_size: float) -> list[_Face]:
     """All faces on the boundary of the wall; the flux in kelvins a cell, for a material of conductivity 1."""
     knots = (volumes["knots"], volumes["knots"], volumes["knots_across"])
-    along, across = np.linspace(-1, 1, _FINENESS), np.linspace(0, 1, _FINENESS_ACROSS)
+    along, across = np.linspace(-1, 1, _FINENESS + 1), np.linspace(0, 1, _FINENESS_ACROSS + 1)
     faces = []
     for patch, face, _ in volumes["boundary"].tolist():
         numbers = volumes["patch_points"][patch]
@@ -99,113 +125,6 @@ def _sampled(volumes: dict[str, Floats], temperature: Floats, cell_size: float) 
         fields = (space.evaluate(*grid), outward, heat.evaluate(*grid)[..., 2], lengths)
         faces.append(_Face(*(np.squeeze(field, axis=axis) for field in fields)))
     return faces
-
-
-def _surface(faces: list[_Face], values: str, rise: float, table: vtk.vtkLookupTable) -> vtk.vtkActor:
-    squares, first = [], 0
-    for face in faces:
-        index = first + np.arange(face.temperature.size).reshape(face.temperature.shape)
-        corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
-        sides = (face.points[1, 0] - face.points[0, 0], face.points[0, 1] - face.points[0, 0])
-        if np.cross(*sides) @ face.normals[0, 0] < 0:
-            corners = corners[::-1]
-        squares.append(np.stack(corners, axis=-1).reshape(-1, 4))
-        first += face.temperature.size
-    mesh = _poly_data(faces)
-    mesh.SetPolys(_cells(squares))
-    normals = np.concatenate([face.normals.reshape(-1, 3) for face in faces])
-    mesh.GetPointData().SetNormals(numpy_to_vtk(normals, deep=True))
-    scalars = np.concatenate([getattr(face, values).ravel() for face in faces]) + rise
-    mesh.GetPointData().SetScalars(numpy_to_vtk(scalars, deep=True))
-    mapper = _mapper(mesh)
-    mapper.SetLookupTable(table)
-    mapper.UseLookupTableScalarRangeOn()
-    mapper.InterpolateScalarsBeforeMappingOn()
-    actor = vtk.vtkActor()
-    actor.SetMapper(mapper)
-    actor.GetProperty().SetAmbient(0.2)
-    actor.GetProperty().SetSpecular(0.15)
-    return actor
-
-
-def _outlines(faces: list[_Face]) -> vtk.vtkActor:
-    lines, first = vtk.vtkCellArray(), 0
-    for face in faces:
-        index = first + np.arange(face.temperature.size).reshape(face.temperature.shape)
-        for line in (index[0], index[-1], index[:, 0], index[:, -1]):
-            lines.InsertNextCell(len(line))
-            for point in line.tolist():
-                lines.InsertCellPoint(point)
-        first += face.temperature.size
-    outlines = _poly_data(faces)
-    outlines.SetLines(lines)
-    actor = vtk.vtkActor()
-    actor.SetMapper(_mapper(outlines))
-    actor.GetProperty().SetColor(*LINE_COLOUR)
-    actor.GetProperty().LightingOff()
-    return actor
-
-
-def _poly_data(faces: list[_Face]) -> vtk.vtkPolyData:
-    points = vtk.vtkPoints()
-    points.SetData(numpy_to_vtk(np.concatenate([face.points.reshape(-1, 3) for face in faces]), deep=True))
-    data = vtk.vtkPolyData()
-    data.SetPoints(points)
-    return data
-
-
-def _cells(squares: list[NDArray[np.int64]]) -> vtk.vtkCellArray:
-    cells = vtk.vtkCellArray()
-    cells.SetData(4, numpy_to_vtkIdTypeArray(np.concatenate(squares).ravel(), deep=True))
-    return cells
-
-
-def _mapper(data: vtk.vtkPolyData) -> vtk.vtkPolyDataMapper:
-    mapper = vtk.vtkPolyDataMapper()
-    mapper.SetInputData(data)
-    mapper.SetResolveCoincidentTopologyToPolygonOffset()
-    return mapper
-
-
-def lookup_table(colours: Colours, limits: tuple[float, float], count: int) -> vtk.vtkLookupTable:
-    table = vtk.vtkLookupTable()
-    table.SetNumberOfTableValues(count)
-    table.SetRange(*limits)
-    for index, place in enumerate(np.linspace(0, len(colours) - 1, count)):
-        mixed = (np.interp(place, range(len(colours)), channel) for channel in zip(*colours, strict=True))
-        table.SetTableValue(index, *mixed, 1.0)
-    return table
-
-
-def legend(table: vtk.vtkLookupTable, title: str, left: float) -> vtk.vtkScalarBarActor:
-    legend = vtk.vtkScalarBarActor()
-    legend.SetLookupTable(table)
-    legend.SetTitle(title)
-    legend.SetNumberOfLabels(3)
-    legend.SetLabelFormat("%.1f")
-    legend.SetMaximumNumberOfColors(SHADES)
-    legend.SetPosition(left, 0.2)
-    legend.SetWidth(0.04)
-    legend.SetHeight(0.6)
-    legend.UnconstrainedFontSizeOn()
-    for text in (legend.GetTitleTextProperty(), legend.GetLabelTextProperty()):
-        text.SetColor(*LINE_COLOUR)
-        text.SetFontSize(15)
-        text.BoldOff()
-        text.ItalicOff()
-        text.ShadowOff()
-    return legend
-
-
-def place_camera(renderer: vtk.vtkRenderer, cell_size: float) -> None:
-    middle = CELLS * cell_size / 2
-    camera = renderer.GetActiveCamera()
-    camera.SetViewUp(0, 0, 1)
-    camera.SetFocalPoint(middle, middle, middle)
-    camera.SetPosition(*(middle + 10 * cell_size * np.array(_CAMERA)).tolist())
-    camera.ParallelProjectionOn()
-    camera.SetParallelScale(_HEIGHT * cell_size / 2)
-    renderer.ResetCameraClippingRange()
 
 
 if __name__ == "__main__":

@@ -290,7 +290,7 @@ def test_a_type_checker_knows_both_methods_and_both_functions(tmp_path: Path) ->
     assert 'typed.py:9: note: Revealed type is "cadquery.cq.Workplane"' in said
     errors = [line for line in said if "error:" in line and line.startswith("typed.py")]
     assert len(errors) == 1
-    assert errors[0].startswith('typed.py:10: error: Argument "cells" to "gyroid"')
+    assert errors[0].startswith('typed.py:10: error: Argument "cells" ')
 
 
 def test_the_typed_workplane_is_cadquerys_with_the_same_methods() -> None:

@@ -5,43 +5,36 @@
 
 from __future__ import annotations
 
+import ast
 import re
-import shlex
 from importlib import import_module
-from itertools import pairwise
 from math import atan2, degrees, sqrt
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from documented import ROOT, blocks_of, missing, run_python, run_shell
 from scipy.special import ellipk
+from test_rooms import FOLDER, ROWS
 
 import gyroid_cad
-from gyroid_cad.cli.app import main
 from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.surface.fit_report import fit_report
 from gyroid_cad.surface.weierstrass import CORNER
 
-ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 IMAGES = sorted((DOCS / "images").iterdir())
 MOST_BYTES = 4_000_000
-_FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 
 
 def name_of(path: Path) -> str:
     return path.relative_to(DOCS).as_posix()
 
 
-def blocks(page: Path) -> list[tuple[str, str]]:
-    """Language and text of every fenced block, in their order."""
-    return _FENCE.findall(page.read_text())
-
-
 def with_language(language: str) -> list[Path]:
-    return [page for page in PAGES if any(found == language for found, _ in blocks(page))]
+    return [page for page in PAGES if any(block.language == language for block in blocks_of(page))]
 
 
 @pytest.fixture
@@ -56,33 +49,32 @@ def test_the_code_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_say
 ) -> None:
     # In this process: CadQuery and build123d take seconds to load. Two tutorials take four to six seconds each, for
     # they cut real parts with the kernel; all the other pages together, as many besides what is loaded.
-    (in_folder / "lattice.toml").write_text("\n".join(text for language, text in blocks(page) if language == "toml"))
-    namespace = {"__name__": "__main__"}
-    printed = None
-    for number, (language, text) in enumerate(blocks(page)):
-        if language == "python":
-            exec(compile(text, f"{name_of(page)}, block {number + 1}", "exec"), namespace)
-            printed = capsys.readouterr().out
-        elif language == "text" and printed is not None:
-            assert printed == text
-            printed = None
+    blocks = blocks_of(page)
+    (in_folder / "lattice.toml").write_text("\n".join(block.text for block in blocks if block.language == "toml"))
+    namespace: dict[str, object] = {"__name__": "__main__"}
+    for block in blocks:
+        if block.language == "python":
+            assert run_python(block, capsys, namespace) == (block.printed or "")
 
 
 @pytest.mark.parametrize("page", with_language("sh"), ids=name_of)
 def test_the_commands_of_a_page_run(page: Path, in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for language, text in blocks(page):
-        if language == "toml":
-            (in_folder / "lattice.toml").write_text(text)
-        for command in text.splitlines() if language == "sh" else ():
-            program, *arguments = shlex.split(command)
-            if program == "gyroid-cad":
-                assert main(arguments) == 0, capsys.readouterr().err
+    for block in blocks_of(page):
+        if block.language == "toml":
+            (in_folder / "lattice.toml").write_text(block.text)
+        elif block.language == "sh":
+            assert missing(block.printed or "", run_shell(block, capsys)) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_what_a_page_says_is_printed_stands_right_below_what_prints_it(page: Path) -> None:
+    blocks = blocks_of(page)
+    assert sum(block.language == "text" for block in blocks) == sum(block.printed is not None for block in blocks)
 
 
 @pytest.mark.parametrize("tutorial", sorted((DOCS / "tutorials").glob("*.md")), ids=name_of)
 def test_a_tutorial_says_what_its_code_prints(tutorial: Path) -> None:
-    languages = [language for language, _ in blocks(tutorial)]
-    assert ("python", "text") in list(pairwise(languages))
+    assert any(block.language == "python" and block.printed for block in blocks_of(tutorial))
 
 
 @pytest.mark.parametrize("image", IMAGES, ids=lambda path: path.name)
@@ -177,6 +169,24 @@ def test_every_public_name_has_its_place_in_the_reference() -> None:
     for module in ("cq_plugin", "bd_objects"):
         public = import_module(f"gyroid_cad.{module}").__all__
         assert set(re.findall(rf"^::: gyroid_cad\.{module}\.(\w+)$", shown, flags=re.MULTILINE)) == set(public)
+
+
+def test_the_house_s_page_shows_every_room_in_its_order_by_its_own_first_line() -> None:
+    rooms = [room for row in ROWS for room in row if not room.startswith("__")]
+    page = (DOCS / "development" / "house.md").read_text()
+    shown = re.findall(r"^\| `(\w+)` \| (.*) \|$", page, flags=re.MULTILINE)
+    assert shown == [(room, first_line(room)) for room in rooms]
+    order = "\n".join(", ".join(room for room in row if room in rooms) for row in ROWS if set(row) & set(rooms))
+    assert f"```\n{order}\n```" in page
+
+
+def first_line(room: str) -> str:
+    folder = FOLDER / room
+    docstring = ast.get_docstring(
+        ast.parse((folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")).read_text())
+    )
+    assert docstring is not None
+    return docstring.splitlines()[0].replace("``", "`")
 
 
 def test_nothing_in_the_site_is_fetched_from_elsewhere() -> None:

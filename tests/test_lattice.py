@@ -225,8 +225,8 @@ def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> Non
 def test_what_cannot_be_written_is_refused_before_anything_is_built(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: list[str], settings: dict[str, Any], words: str
 ) -> None:
-    for function in ("build", "triangles"):
-        monkeypatch.setattr(f"gyroid_cad.lattice.{function}", lambda *_: pytest.fail("it was built"))
+    for function in ("builds.solid.build", "lattice.triangles"):
+        monkeypatch.setattr(f"gyroid_cad.{function}", lambda *_: pytest.fail("it was built"))
     with pytest.raises(ParameterError) as caught:
         Lattice(**GOOD).write(*(tmp_path / name for name in names), **settings)
     assert words in str(caught.value)
@@ -237,7 +237,7 @@ def test_what_cannot_be_written_is_refused_before_anything_is_built(
 def test_the_solid_is_built_only_where_a_file_needs_it(
     cell: Lattice, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gyroid_cad.lattice.build", lambda *_: pytest.fail("it was built"))
+    monkeypatch.setattr("gyroid_cad.builds.solid.build", lambda *_: pytest.fail("it was built"))
     cell.write(tmp_path / "part.stl", tmp_path / "part.3mf", deviation=0.1)
     assert {path.name for path in tmp_path.iterdir()} == {"part.stl", "part.3mf"}
     assert not cell.needs_solid(["a.stl", "b.3MF"])

@@ -41,16 +41,17 @@ ROW = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
 EXCEPTIONS: dict[tuple[str, str], str] = {}
 # Which rooms or modules may load a heavy package.
 OWNERS = {
-    "OCP": ("kernel.",),
-    "cadquery": ("cq_plugin", "cli.viewer", "host_shapes"),
+    "OCP": ("kernel",),
+    "cadquery": ("cq_plugin", "cli.window", "host_shapes"),
     "build123d": ("bd_objects", "host_shapes"),
     # CadQuery's viewer is made of it, and distances to triangles are asked of it.
-    "vtkmodules": ("cli.viewer", "mesh.triangles.measures"),
+    "vtkmodules": ("cli.window", "mesh.triangles.measures"),
 }
 MOST_LINES = 400
 MOST_IMPORTS_IN_FUNCTIONS = 60
 MOST_MODULES_WITH_ONE_IMPORTER = 25
-MOST_FILES_TO_STEP, MOST_ROOMS_TO_STEP = 20, 9
+# Beside the tools of "common": progress, memory, files and the like, that every road takes.
+MOST_FILES_TO_STEP, MOST_TOOLS_TO_STEP, MOST_ROOMS_TO_STEP = 20, 8, 9
 
 
 def module_name(path: Path) -> str:
@@ -203,7 +204,8 @@ def test_imports_inside_functions_are_few() -> None:
 def test_few_modules_serve_only_one_other() -> None:
     importers: dict[str, set[str]] = {module: set() for module in MODULES}
     for module in MODULES:
-        for other in imported_of_ours(module) - {module}:
+        # The command line loads its commands by name: then its folder is what is imported.
+        for other in imported_of_ours(module) - {module, "cli"}:
             importers[other].add(module)
     alone = sorted(module for module, users in importers.items() if len(users) == 1)
     assert len(alone) <= MOST_MODULES_WITH_ONE_IMPORTER, alone
@@ -215,6 +217,7 @@ def test_the_way_from_a_thickness_to_a_step_file_is_short(tmp_path: Path) -> Non
 import sys
 from pathlib import Path
 from gyroid_cad import Lattice
+import gyroid_cad.builds.solid
 entered = set()
 def note(frame, event, argument):
     code = frame.f_code
@@ -230,7 +233,9 @@ print(*sorted(entered), sep="\\n")
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     files = [Path(line).relative_to(FOLDER) for line in run.stdout.splitlines()]
     files = [file for file in files if file.name != "__init__.py"]
-    assert 10 < len(files) <= MOST_FILES_TO_STEP, files
+    tools = [file for file in files if file.parts[0] == "common"]
+    assert 10 < len(files) - len(tools) <= MOST_FILES_TO_STEP, files
+    assert len(tools) <= MOST_TOOLS_TO_STEP, tools
     assert len({file.parts[0] for file in files}) <= MOST_ROOMS_TO_STEP
 
 

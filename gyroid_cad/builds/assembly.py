@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from math import prod
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gyroid_cad.builds.solid import Build, build
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import STEP, require_format, require_formats
+from gyroid_cad.common.formats import STEP, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart, Place, write_assembly
+from gyroid_cad.kernel.solid import faces_by_patch
 from gyroid_cad.wall.fitted import LatticeSpec
 
-if TYPE_CHECKING:
-    from gyroid_cad.kernel.assembly import NamedPart, Place
-
-__all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report", "require_assembly_formats"]
+__all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report"]
 
 PART_NAME = "CC"
 # Peak memory of an occurrence in the kernel's document and its writer, as measured, rounded up.
@@ -52,11 +50,10 @@ class Assembly:
 
     def places(self) -> Iterator[Place]:
         """Name, ``CC_i_j_k`` counted from 1, and translation in mm of every cell."""
+        axes = self.cell.fitted.spec.frame.rotation
         for x, y, z in np.ndindex(self.cells):
-            yield (
-                f"{PART_NAME}_{x + 1}_{y + 1}_{z + 1}",
-                (x * self.cell_size, y * self.cell_size, z * self.cell_size),
-            )
+            a, b, c = (axes @ np.array([x, y, z]) * self.cell_size).tolist()
+            yield f"{PART_NAME}_{x + 1}_{y + 1}_{z + 1}", (a, b, c)
 
     def part(self) -> NamedPart:
         """The cell with names and colours of its faces.
@@ -65,8 +62,6 @@ class Assembly:
         red and the cubic cell (CC) green. A face is called ``BC_b_SFP_p_side_s``, with side 0 or 1 of the wall, or
         ``BC_b_SFP_p_edge_k`` where it goes through the wall along edge k of the patch.
         """
-        from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart
-        from gyroid_cad.kernel.solid import faces_by_patch
 
         solid, complex = self.cell.solid(), self.cell.fitted.complex
         bounding_cell = complex.placements.bounding_cell[complex.patch_placement].tolist()
@@ -99,7 +94,6 @@ class Assembly:
             If the kernel finds the cell invalid: then nothing is written.
         ExportError
         """
-        from gyroid_cad.kernel.assembly import write_assembly
 
         targets = require_formats(paths, [STEP])
         require_memory(self.cells, _BYTES_PER_INSTANCE)
@@ -216,14 +210,3 @@ def assembly_report(made: Assembly, thickness: float, density: float, volume_exa
         area=count * made.cell.area(),
         seconds=dict(made.cell.seconds),
     )
-
-
-def require_assembly_formats(targets: Sequence[Path]) -> None:
-    """Check that files can hold an assembly: STEP only.
-
-    Raises
-    ------
-    ParameterError
-    """
-    for path in targets:
-        require_format("output", path, [STEP], "an assembly: a file name ending in ")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from gyroid_cad.builds.solid import Build
 from gyroid_cad.common.tables import Rows, cells_shown, islands_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.surface.fit_report import fit_report
+
+if TYPE_CHECKING:
+    from gyroid_cad.builds.solid import Build
 
 __all__ = ["LatticeReport", "report_of"]
 

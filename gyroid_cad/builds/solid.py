@@ -7,33 +7,35 @@ from contextlib import contextmanager
 from functools import partial
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import BREP, STEP, STL, format_of, require_meshing, require_schema
+from gyroid_cad.common.formats import BREP, FILE_BYTES_PER_CELL, STEP, STL, format_of
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.brep import write_brep
+from gyroid_cad.kernel.check import compound_of, enclosed_volume, is_valid, topology
+from gyroid_cad.kernel.solid import KernelShape, another_handle, build_solid
+from gyroid_cad.kernel.step import write_step
+from gyroid_cad.kernel.stl import meshed, write_meshed_stl
+from gyroid_cad.kernel.trimmed import build_trimmed
+from gyroid_cad.mesh.triangles.three_mf import write_3mf
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
 from gyroid_cad.wall.areas import fitted_areas
 from gyroid_cad.wall.covering import PERTURBATIONS, first_success
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
-if TYPE_CHECKING:
-    from gyroid_cad.kernel.solid import KernelShape
-
-__all__ = ["Build", "build", "require_settings", "write_shape"]
+__all__ = ["Build", "build", "write_shape"]
 
 Floats = NDArray[np.float64]
 
 # Peak memory a cell, as benchmarks/memory.py measures it, rounded up.
 _SOLID_BYTES_PER_CELL = 1_500_000
-_FILE_BYTES_PER_CELL = 6_000_000
 # Volume in the kernel against that of the nets it was given: rounding only.
 _VOLUME_AGREEMENT = 1e-9
 # Of cut cells against whole ones: how closely the section curves are fitted.
@@ -54,7 +56,7 @@ class Build:
     islands : Islands
         Of a lattice that was cut.
     shift : tuple of float
-        Of the lattice in its box, in mm, where it could not be cut without.
+        Of the lattice in its box, along its own axes, in mm, where it could not be cut without.
     seconds : dict
         By stage.
     """
@@ -67,9 +69,6 @@ class Build:
         self.islands = Islands()
         self._cut_area = 0.0
         self._require_memory(_SOLID_BYTES_PER_CELL)
-        with self.timed("kernel", progress):
-            from gyroid_cad.kernel.check import enclosed_volume, topology
-            from gyroid_cad.kernel.solid import build_solid
         wall = fitted.wall
         if fitted.spec.trimmed:
             self._shape, self.volume, self.patches = first_success(
@@ -97,15 +96,15 @@ class Build:
 
     def _trimmed(self, shift: Floats, progress: Progress | None) -> tuple[KernelShape, float, int]:
         """Return the shape cut to the block of cells, its volume, and how many patches are in it."""
-        from gyroid_cad.kernel.check import compound_of
-        from gyroid_cad.kernel.trimmed import build_trimmed
 
         spec = self.fitted.spec
         size = spec.grading.cell_size
-        box = Box(np.eye(3), np.zeros(3), np.array(self.cells) * size)
+        axes = spec.frame.rotation
+        low = spec.frame.origin @ axes
+        box = Box(axes, low, low + np.array(self.cells) * size)
         with self.timed("cut", progress):
             # Some curve always ends on an edge of whole cells: nobody asks whether their corners are filled.
-            left = cut_to_box(self.fitted.wall.moved(np.eye(3), shift), box, [(0, True), (1, False)], size, True)
+            left = cut_to_box(self.fitted.wall.moved(np.eye(3), axes @ shift), box, [(0, True), (1, False)], size, True)
         with self.timed("solid", progress):
             solids = build_trimmed(left)
         volumes = left.volumes.tolist()
@@ -137,15 +136,12 @@ class Build:
 
     def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""
-        from gyroid_cad.kernel.solid import another_handle
 
         return another_handle(self._shape)
 
     def valid(self, progress: Progress | None = None) -> bool:
         """Verdict of the kernel's own check, asked once."""
         if self._valid is None:
-            from gyroid_cad.kernel.check import is_valid
-
             with self.timed("check", progress):
                 self._valid = is_valid(self._shape)
         return self._valid
@@ -161,7 +157,7 @@ class Build:
             If the kernel finds the solid invalid: then nothing is written.
         ExportError
         """
-        self._require_memory(_FILE_BYTES_PER_CELL)
+        self._require_memory(FILE_BYTES_PER_CELL)
         if not self.valid(progress):
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
@@ -193,10 +189,6 @@ def write_shape(
     ------
     ExportError
     """
-    from gyroid_cad.kernel.brep import write_brep
-    from gyroid_cad.kernel.step import write_step
-    from gyroid_cad.kernel.stl import meshed, write_meshed_stl
-    from gyroid_cad.mesh.triangles.three_mf import write_3mf
 
     form = format_of(path)
     if form is STEP:
@@ -236,27 +228,3 @@ def build(spec: LatticeSpec, progress: Progress | None = None) -> Build:
         return Build(fitted_wall(spec, progress), progress)
 
     return _builds.get(spec, made)
-
-
-def require_settings(
-    cells: tuple[int, int, int], schema: Schema, deviation: float | None, angle: float, solid: bool = True
-) -> None:
-    """Check the settings of files to be written, and that memory will do, before anything is built.
-
-    Parameters
-    ----------
-    cells : tuple of int
-    schema : str
-    deviation : float, optional
-    angle : float
-    solid : bool
-        Whether there is a solid to be written; triangles of a wall are streamed.
-
-    Raises
-    ------
-    ParameterError
-    """
-    require_schema(schema)
-    require_meshing(1.0 if deviation is None else deviation, angle)
-    if solid:
-        require_memory(cells, _FILE_BYTES_PER_CELL)

@@ -9,6 +9,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from gyroid_cad.common.inputs import key_line, read_toml
 from gyroid_cad.errors import ParameterError
 
@@ -124,7 +126,6 @@ def printed_config(values: Mapping[str, Any]) -> str:
     values : mapping
         Of numbers, text, truths, and sequences of them.
     """
-    import tomli_w
 
     given = {
         key: list(value) if isinstance(value, tuple) else _number_or_text(value)

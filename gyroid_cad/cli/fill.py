@@ -35,7 +35,7 @@ from gyroid_cad.cli.options import (
 from gyroid_cad.cli.print_check import check_by
 from gyroid_cad.common.choices import KINDS
 from gyroid_cad.common.files import file_sizes
-from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endings
+from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endings, require_formats, require_settings
 
 __all__ = ["fill_command"]
 
@@ -129,8 +129,6 @@ def fill_command(
     gyroid-cad fill other.step fill.toml -o other_light.step --density 0.25
     """
     start = time.perf_counter()
-    from gyroid_cad.builds.solid import require_settings
-    from gyroid_cad.common.formats import require_formats
     from gyroid_cad.filling.fill import fill
 
     if part is None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gyroid_cad.cli.config import Config, printed_config, read_config
 from gyroid_cad.cli.messages import config_of, label, remember_config
 from gyroid_cad.cli.options import Decorator, file_paths
 from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS
@@ -14,7 +15,6 @@ from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
-    from gyroid_cad.cli.config import Config
     from gyroid_cad.lattice import Lattice
     from gyroid_cad.surface.fit import FitSettings
 
@@ -65,7 +65,6 @@ def take_defaults(
     ------
     ParameterError
     """
-    from gyroid_cad.cli.config import read_config
 
     options = {p.name: p for p in context.command.params if p.name and p.expose_value and p.name not in _NO_KEYS}
     own_flags = {name for name, option in options.items() if getattr(option, "is_flag", False)}
@@ -98,7 +97,6 @@ def _default(context: click.Context, config: Config, key: str, multiple: bool) -
 
 def printed_options() -> str:
     """Options of the command that runs, as TOML that it would read."""
-    from gyroid_cad.cli.config import printed_config
 
     context = click.get_current_context()
     keys = [name for name in (p.name for p in context.command.params) if name in context.params]
@@ -284,7 +282,7 @@ def density_of(given: dict[str, Any]) -> Any:
     if given["porosity"] is None:
         return given["density"]
     from gyroid_cad.fields.field import as_field
-    from gyroid_cad.wall.limits import percent_hint
+    from gyroid_cad.wall.parameters import percent_hint
 
     porosity = as_field("porosity", given["porosity"], "a volume fraction")
     if not isinstance(porosity, float):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
 from gyroid_cad.common.choices import SCHEMAS
+from gyroid_cad.version import __version__
 
 __all__ = [
     "angle_option",
@@ -20,6 +21,7 @@ __all__ = [
     "printer_option",
     "quiet_option",
     "schema_option",
+    "version_option",
 ]
 
 Declared = TypeVar("Declared", bound=Callable[..., object])
@@ -87,3 +89,24 @@ angle_option = click.option(
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 quiet_option = click.option("--quiet", is_flag=True, help="Print no table and no progress.")
+
+
+def _print_version(context: click.Context, parameter: click.Parameter, requested: bool) -> None:
+    if requested:
+        from gyroid_cad.cli.installation import kernel_version
+
+        click.echo(f"{context.info_name} {__version__}, {kernel_version()}")
+        context.exit()
+
+
+def version_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the option ``--version``, which tells the kernel's version too and does not load it."""
+    option = click.option(
+        "--version",
+        is_flag=True,
+        expose_value=False,
+        is_eager=True,
+        callback=_print_version,
+        help="Show the version, and the kernel's, and exit.",
+    )
+    return option(function)

@@ -13,7 +13,7 @@ import click
 from gyroid_cad.cli.console import print_check_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.cli.options import json_option, printer_option
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
+from gyroid_cad.common.formats import TOML, TRIANGLE_FORMATS, format_of, require_format
 
 if TYPE_CHECKING:
     from gyroid_cad.common.progress import Progress
@@ -63,9 +63,10 @@ def print_check_command(
     start = time.perf_counter()
     checked, file = check_by(printer), given["config"]
     part: Any = file
-    if file is None or format_of(file) not in TRIANGLE_FORMATS:
+    if file is None or format_of(file) is TOML:
         part = lattice_of(given)
     else:
+        require_format("input file", file, TRIANGLE_FORMATS, "a lattice in a .toml file, or a file ending in ")
         described = options_given(_HOW)
         if described:
             raise click.UsageError(f"{file} is a part already: none of {', '.join(described)}")

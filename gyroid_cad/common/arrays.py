@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Point", "cross", "dot", "freeze_arrays"]
+__all__ = ["Point", "cross", "dot", "freeze_arrays", "unit"]
 
 # As users give it, and reports tell it.
 Point = tuple[float, float, float]
@@ -38,3 +38,13 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
 def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Scalar products of vectors along the last axis (``numpy.vecdot``, which numpy 1.26 does not have)."""
     return np.asarray(np.sum(a * b, axis=-1))
+
+
+def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors along the last axis; zero where there is no length.
+
+    >>> unit(np.array([[3.0, 4.0], [0.0, 0.0]]))
+    array([[0.6, 0.8],
+           [0. , 0. ]])
+    """
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(float).tiny))

@@ -16,6 +16,7 @@ from types import MappingProxyType
 
 from gyroid_cad.common.choices import SCHEMAS, Schema
 from gyroid_cad.common.files import require_distinct, require_writable
+from gyroid_cad.common.memory import require_memory
 from gyroid_cad.errors import ParameterError
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "ANSYS",
     "BREP",
     "DEFAULT_ANGLE",
+    "FILE_BYTES_PER_CELL",
     "FORMATS",
     "GISMO",
     "GMSH",
@@ -46,11 +48,13 @@ __all__ = [
     "format_of",
     "listed_endings",
     "listed_formats",
+    "require_assembly_formats",
     "require_format",
     "require_formats",
     "require_meshing",
     "require_output",
     "require_schema",
+    "require_settings",
 ]
 
 
@@ -107,6 +111,8 @@ PART_FORMATS = tuple(form for form in FORMATS if form.holds in ("solid", "triang
 _OF_ENDING = MappingProxyType({ending: form for form in FORMATS for ending in form.endings})
 
 # By the names of the kernel's STEP writer.
+# Peak memory of writing a cell, as benchmarks/memory.py measures it, rounded up.
+FILE_BYTES_PER_CELL = 6_000_000
 _KERNEL_SCHEMAS: Mapping[Schema, str] = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
 # Degrees between neighbouring facets.
 DEFAULT_ANGLE = 15.0
@@ -223,3 +229,38 @@ def require_meshing(deviation: float, angle: float = DEFAULT_ANGLE) -> None:
         raise ParameterError("deviation", deviation, "a length above 0 mm")
     if not (isinstance(angle, Real) and isfinite(angle) and 0 < angle < 90):
         raise ParameterError("angle", angle, "above 0 and below 90 degrees")
+
+
+def require_settings(
+    cells: tuple[int, int, int], schema: Schema, deviation: float | None, angle: float, solid: bool = True
+) -> None:
+    """Check the settings of files to be written, and that memory will do, before anything is built.
+
+    Parameters
+    ----------
+    cells : tuple of int
+    schema : str
+    deviation : float, optional
+    angle : float
+    solid : bool
+        Whether there is a solid to be written; triangles of a wall are streamed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    require_schema(schema)
+    require_meshing(1.0 if deviation is None else deviation, angle)
+    if solid:
+        require_memory(cells, FILE_BYTES_PER_CELL)
+
+
+def require_assembly_formats(targets: Sequence[Path]) -> None:
+    """Check that files can hold an assembly: STEP only.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for path in targets:
+        require_format("output", path, [STEP], "an assembly: a file name ending in ")

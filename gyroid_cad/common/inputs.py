@@ -6,11 +6,15 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["key_line", "read_toml", "unreadable"]
+__all__ = ["key_line", "read_toml", "unreadable", "utf8_named"]
 
 # A key of many parts takes Python's reader the square of their number: a line is then a moment's work at most.
 _MOST_BYTES, _MOST_CHARACTERS_A_LINE = 100_000, 2000
@@ -47,6 +51,31 @@ def unreadable(path: str | os.PathLike[str]) -> str | None:
         return problem.strerror or str(problem)
     except ValueError:
         return "its name has a null character"
+
+
+@contextmanager
+def utf8_named(path: str | os.PathLike[str]) -> Iterator[str]:
+    """Give a path for libraries that know no names but UTF-8: the file's own, or that of a link to it.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Examples
+    --------
+    >>> with utf8_named("bracket.step") as name:
+    ...     name
+    'bracket.step'
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        with TemporaryDirectory() as folder:
+            link = Path(folder, f"file{Path(path).suffix}")
+            link.symlink_to(Path(path).resolve())
+            yield str(link)
+    else:
+        yield str(path)
 
 
 def read_toml(parameter: str, path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
+import psutil
+
 from gyroid_cad.errors import ParameterError
 
 __all__ = ["Room", "cgroup_rooms", "memory_rooms", "require_memory", "require_room"]
@@ -120,7 +122,6 @@ def memory_rooms(kernel: bool = True, base: int = _BASE_BYTES) -> Iterator[Room]
     base : int
         What the program itself takes, in bytes.
     """
-    import psutil
 
     yield Room(psutil.virtual_memory().available, base, "are free")
     yield from cgroup_rooms(base)
@@ -165,7 +166,6 @@ def _process_rooms(loads_kernel: bool) -> Iterator[Room]:
         import resource
     except ImportError:  # there are none on Windows
         return
-    import psutil
 
     limits = [
         (resource.RLIMIT_AS, "vms", _KERNEL_ADDRESSES, "of address space are left (ulimit -v)"),

@@ -1,1 +1,1 @@
-"""A part filled with a lattice."""
+"""A part filled with a lattice: its regions, its skin, its report."""

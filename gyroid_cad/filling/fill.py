@@ -10,18 +10,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from gyroid_cad.builds.solid import require_settings, write_shape
+from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.infill import Infill, block_infill, endless_infill
+from gyroid_cad.filling.infill import Infill, block_infill, endless_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
 from gyroid_cad.host_shapes import HostShapes
@@ -35,9 +34,8 @@ from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.islands import Islands, island_rule
-from gyroid_cad.wall.covering import Frame
-from gyroid_cad.wall.limits import require_cell_size, valid_tolerance
-from gyroid_cad.wall.parameters import USUAL_TOLERANCE
+from gyroid_cad.wall.covering import Frame, frame_of
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
 
 __all__ = ["FillReport", "Filled", "fill"]
 
@@ -258,7 +256,7 @@ def fill(
         Largest deviation in cell sizes of a graded wall; 1e-4 if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness, density and surface are its own.
+        size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
@@ -274,7 +272,7 @@ def fill(
         If the kernel fails, or gives something that is not closed, not valid, or of the wrong volume; or cannot
         offset the part by its skin.
     """
-    frame = Frame(three_numbers("origin", origin), _turn(three_numbers("rotation", rotation)))
+    frame = frame_of(three_numbers("origin", origin), three_numbers("rotation", rotation))
     grams = None if material_density is None else positive_number("material_density", material_density) / 1000
     shell = None if skin is None else positive_number("skin", skin, "a length in mm, a finite number above 0")
     if openings and shell is None:
@@ -288,6 +286,8 @@ def fill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
     )
     whole = part_of(part)
+    if lattice is None:
+        require_cover(whole.low, whole.high, size, (fit or FitSettings()).control_points)
     hollow = None if shell is None else _hollowed(whole, shell, openings)
     core = whole if hollow is None else hollow.core
     filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
@@ -385,9 +385,3 @@ def _reported(
         seconds=dict(filling.seconds),
     )
     return Filled(shapes, report)
-
-
-def _turn(degrees: Floats) -> Floats:
-    """Turns about x, then y, then z."""
-
-    return np.asarray(Rotation.from_euler("xyz", degrees, degrees=True).as_matrix())

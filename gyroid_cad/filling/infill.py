@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field
@@ -21,23 +22,25 @@ from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
     Frame,
     covering_complex,
-    nearest_offsets,
     patch_sides,
     periodic_offsets,
     wall_extremes,
 )
+from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Infill", "block_infill", "endless_infill"]
+__all__ = ["Infill", "block_infill", "endless_infill", "require_cover"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 _BLOCK_SAMPLES = 13
+# Peak memory of filling and writing, for each cell of the box round a part, as measured, rounded up.
+_BYTES_PER_CELL = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,6 +167,32 @@ def endless_infill(
     return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
 
 
+def require_cover(low: Floats, high: Floats, cell_size: float, control_points: int) -> None:
+    """Check that there is memory for the cells that cover a part, before any of them is made.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (3,)
+        Corners of the box round the part, in mm.
+    cell_size : float
+        In mm.
+    control_points : int
+        Of a patch, along a side.
+
+    Raises
+    ------
+    ParameterError
+        Saying how many cells that would be, and which size would do.
+    """
+    count = float(np.prod(np.maximum((high - low) / cell_size, 1)))
+    each = _BYTES_PER_CELL * max(1.0, (control_points / 10) ** 2)
+
+    def accepted(left: int) -> str:
+        return f"at least about {cell_size * (count * each / max(left, each)) ** (1 / 3):.3g} mm for this part"
+
+    require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
+
+
 def block_infill(lattice: Lattice, frame: Frame) -> Infill:
     """A block of cells that was described as a lattice, with whatever varies in it.
 
@@ -171,9 +200,10 @@ def block_infill(lattice: Lattice, frame: Frame) -> Infill:
     ----------
     lattice : Lattice
     frame : Frame
-        Where the lattice's own origin stands.
+        That the lattice is placed by, wherever it stands in its own space.
     """
-    fitted = lattice.fitted()
+    fitted = lattice.fitted().at_home()
+    frame = lattice.spec().frame.within(frame)
     wall = fitted.wall.moved(frame.rotation, frame.origin)
     return Infill(frame, fitted.spec.grading, fitted.complex, wall, fitted.min_thickness, fitted.max_thickness, False)
 

@@ -11,7 +11,7 @@ from gyroid_cad.common.choices import KINDS, Kind
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
-from gyroid_cad.wall.limits import require_density, require_one, require_thickness
+from gyroid_cad.wall.parameters import require_density, require_one, require_thickness
 
 __all__ = ["CHANNELS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
 

@@ -1,4 +1,4 @@
-"""The only folder that imports the CAD kernel (OpenCascade, through OCP)."""
+"""The CAD kernel (OpenCascade, through OCP): surfaces, solids, checks, booleans, reading and writing."""
 
 import os
 

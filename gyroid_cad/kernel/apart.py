@@ -15,7 +15,7 @@ from OCP.BinTools import BinTools
 from OCP.TopoDS import TopoDS_Iterator, TopoDS_Shape
 
 from gyroid_cad.common.formats import BREP, STEP, Format, format_of
-from gyroid_cad.common.inputs import unreadable
+from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.brep import read_brep
 from gyroid_cad.kernel.check import compound_of
@@ -109,8 +109,7 @@ def read_apart(path: str | os.PathLike[str], reader: Callable[[str], Contents]) 
     ExportError
         If the reader raises one, crashes, or does not come to an end.
     """
-    with TemporaryDirectory() as folder:
-        known = _name_for_kernel(path, folder)
+    with TemporaryDirectory() as folder, utf8_named(path) as known:
         # A program that was packed into one file has no Python to start.
         if getattr(sys, "frozen", False):
             return reader(known)
@@ -176,14 +175,3 @@ def require_cad_file(path: str | os.PathLike[str]) -> Format:
         if _MARKS[form] not in file.read(_HEADER_BYTES).upper():
             raise ExportError(f"{path} could not be read as {form.name}: it does not begin as such a file does")
     return form
-
-
-def _name_for_kernel(path: str | os.PathLike[str], folder: str) -> str:
-    """Return the path, or that of a link to it in a folder: the kernel knows no names that are not UTF-8."""
-    try:
-        str(path).encode()
-        return str(path)
-    except UnicodeEncodeError:
-        link = Path(folder, f"file{Path(path).suffix}")
-        link.symlink_to(Path(path).resolve())
-        return str(link)

@@ -28,10 +28,10 @@ from gyroid_cad.kernel.compat import LabelSequence, NumberedShapes
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.step import no_messages
 
-__all__ = ["Colour", "ColouredPart", "coloured_contents", "coloured_parts", "extent_of"]
+__all__ = ["ColouredPart", "OwnColour", "coloured_contents", "coloured_parts", "extent_of"]
 
 # Red, green and blue, 0 to 1, as a screen has them (sRGB); none where the file says nothing.
-Colour = tuple[float, float, float] | None
+OwnColour = tuple[float, float, float] | None
 
 Floats = NDArray[np.float64]
 
@@ -43,14 +43,14 @@ class ColouredPart:
     Attributes
     ----------
     shape : TopoDS_Shape
-    colours : tuple of Colour
+    colours : tuple of OwnColour
         Of its faces, as ``TopExp_Explorer`` counts them.
     places : ndarray, shape (k, 3, 4)
         Of each occurrence: rotation, and translation in mm in the last column.
     """
 
     shape: TopoDS_Shape
-    colours: tuple[Colour, ...]
+    colours: tuple[OwnColour, ...]
     places: Floats
 
 
@@ -104,9 +104,9 @@ class _Occurrences:
     def __init__(self, document: TDocStd_Document) -> None:
         self._colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
         self._labels: dict[str, TDF_Label] = {}
-        self.places: dict[tuple[str, Colour], list[Floats]] = {}
+        self.places: dict[tuple[str, OwnColour], list[Floats]] = {}
 
-    def add(self, label: TDF_Label, location: TopLoc_Location, over: Colour) -> None:
+    def add(self, label: TDF_Label, location: TopLoc_Location, over: OwnColour) -> None:
         """Add what a label holds, moved; a colour of the occurrence goes before that of the part."""
         if XCAFDoc_ShapeTool.IsReference_s(label):
             part = TDF_Label()
@@ -135,7 +135,7 @@ class _Occurrences:
             for (entry, over), places in self.places.items()
         ]
 
-    def _face_colours(self, label: TDF_Label, shape: TopoDS_Shape) -> Iterator[Colour]:
+    def _face_colours(self, label: TDF_Label, shape: TopoDS_Shape) -> Iterator[OwnColour]:
         subshapes, numbered = LabelSequence(), NumberedShapes()
         XCAFDoc_ShapeTool.GetSubShapes_s(label, subshapes)
         own = {numbered.Add(XCAFDoc_ShapeTool.GetShape_s(one)): self._colour(one) for one in _labels(subshapes)}
@@ -143,7 +143,7 @@ class _Occurrences:
         # A shape that the map does not hold has number 0.
         return (own.get(numbered.FindIndex(face)) or whole for face in parts_of(shape, TopAbs_FACE))
 
-    def _colour(self, label: TDF_Label) -> Colour:
+    def _colour(self, label: TDF_Label) -> OwnColour:
         colour = Quantity_Color()
         for kind in (XCAFDoc_ColorSurf, XCAFDoc_ColorGen):
             if XCAFDoc_ColorTool.GetColor_s(label, kind, colour):

@@ -5,6 +5,7 @@ CadQuery 2.8 brings OCP 7.9, build123d 0.13 brings OCP 8. No other module knows 
 
 from __future__ import annotations
 
+import OCP
 from OCP.TopoDS import TopoDS
 
 try:
@@ -58,4 +59,10 @@ __all__ = [
     "as_shell",
     "as_solid",
     "as_vertex",
+    "kernel_origin",
 ]
+
+
+def kernel_origin() -> str:
+    """The version that the kernel itself says it has, and the file it was loaded from."""
+    return f"OCP {OCP.__version__}, {OCP.__file__}"

@@ -21,14 +21,34 @@ from contextlib import contextmanager, suppress
 from OCP.Standard import Standard_OutOfMemory
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.common.processes import end_with_parent
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.region_merge import Joining
 from gyroid_cad.kernel.region_split import Found, RegionSplit, Task
 from gyroid_cad.kernel.split import Pieces, split
 
-__all__ = ["split_by_region"]
+__all__ = ["end_with_parent", "split_by_region"]
+
+# Of prctl(2): the signal that a process gets when the one that started it ends.
+_SET_SIGNAL_AT_PARENTS_END = 1
+
+
+def end_with_parent(parent: int) -> None:
+    """Let the system end this process at once when its parent ends, however that ends (Linux; elsewhere nothing).
+
+    Parameters
+    ----------
+    parent : int
+        Its number, as ``os.getpid`` gives it there: it may have ended already.
+    """
+    if sys.platform != "linux":
+        return
+    import ctypes  # not needed by those who never start a process
+
+    ctypes.CDLL(None).prctl(_SET_SIGNAL_AT_PARENTS_END, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
 
 # With fewer faces, starting processes is not worth it.
 _FEW = 64
@@ -84,7 +104,7 @@ def _can_fork() -> bool:
 
 
 def _found_here(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
-    """What is found in each region, one after the other."""
+    """Pieces found in each region, one after the other."""
     found, done = [], 0
     for region in task.regions:
         found.append(_found_in(task, region))
@@ -99,7 +119,7 @@ _inherited: list[Task] = []
 
 
 def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
-    """What is found in each region."""
+    """Pieces found in each region, several at a time."""
     before = multiprocessing.active_children()
     executor = ProcessPoolExecutor(
         min(processes, len(task.regions)),
@@ -125,6 +145,7 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
         for process in multiprocessing.active_children():
             if process not in before:
                 process.kill()
+                process.join()
         if isinstance(problem, RuntimeError | OSError) and not isinstance(problem, KernelError):
             raise KernelError(f"no processes could be started to split the part: {problem}") from problem
         raise

@@ -228,7 +228,9 @@ def grid_derivatives(
 
     def products(along_u: Floats, along_v: Floats, net: Floats) -> Floats:
         n, m = net.shape[-3:-1]
-        wide = (along_u @ net.reshape(*net.shape[:-3], n, -1)).reshape(*net.shape[:-3], len(along_u), m, -1)
+        components = net.shape[-1]
+        wide = along_u @ net.reshape(*net.shape[:-3], n, m * components)
+        wide = wide.reshape(*net.shape[:-3], len(along_u), m, components)
         return np.asarray(along_v @ wide)
 
     return _derivatives(nets, weights, knots, (u, v), order, products)

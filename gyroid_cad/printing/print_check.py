@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.formats import require_meshing
 from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import text_table
@@ -234,6 +235,8 @@ def print_check(
     ParameterError
     """
     chosen = printer if isinstance(printer, Printer) else printer_named(printer)
+    if deviation is not None:
+        require_meshing(deviation)
     if isinstance(part, Lattice):
         return _check_lattice(part, chosen, deviation, progress)
     vertices: NDArray[np.floating]
@@ -267,7 +270,7 @@ def _check_lattice(
     opening = (
         pore_limiting_diameter(grading.surface, grading.cell_size, fitted.min_thickness)
         if grading.uniform
-        else narrowest_opening(fitted.wall, grading, lattice.cells)
+        else narrowest_opening(fitted.at_home().wall, grading, lattice.cells)
     )
     if fitted.spec.trimmed:
         limit = min(lattice.cell_size / 1000, fitted.min_thickness / 10) if deviation is None else deviation

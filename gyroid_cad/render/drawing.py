@@ -39,8 +39,8 @@ _SHADE, _LAMP = 0.5, 0.62
 _DIRECTION = np.array([-0.45, 0.6, 0.66]) / np.linalg.norm([-0.45, 0.6, 0.66])
 # How much darker a sample is on an outline or a sharp edge, beside it, and where two faces meet smoothly.
 _EDGE, _BESIDE, _SMOOTH = 0.75, 0.4, 0.25
-# Of depth between neighbouring samples, beyond what their triangles' slopes explain, in samples.
-_JUMP = 8.0
+# Of depth between neighbouring samples, beyond what their triangles' slopes explain, in parts of the picture's width.
+_JUMP = 0.01
 # In parts of the length of what is drawn: its width, at least.
 _THINNEST = 1e-6
 _NO_LENGTH = float(np.finfo(float).tiny)
@@ -261,7 +261,7 @@ def _ink(scene: _Scene, seen: Integers, hit: Integers, width: int) -> Singles:
         change = place[there] - place[here]
         low, high = np.minimum(slope[one], slope[other]), np.maximum(slope[one], slope[other])
         # One curved surface falls by something between its slopes here and there.
-        jump = np.maximum(low - change, change - high) > _JUMP + np.minimum(np.abs(low), np.abs(high)) / 2
+        jump = np.maximum(low - change, change - high) > _JUMP * width + np.minimum(np.abs(low), np.abs(high)) / 2
         sharp_edge = scene.surfaces[one] != scene.surfaces[other]
         meeting = scene.faces[one] != scene.faces[other]
         for lines, kind in ((outline | jump | sharp_edge, sharp), (meeting, smooth)):

@@ -17,7 +17,7 @@ from gyroid_cad.wall.offset import SIDES, Wall
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["COLOURS", "Colour", "Facets", "facets_of_shape", "facets_of_triangles", "facets_of_wall"]
+__all__ = ["COLOURS", "Colour", "Facets", "facets_of_grids", "facets_of_shape", "facets_of_triangles", "facets_of_wall"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -29,8 +29,8 @@ REST = 2
 # Squares along each side of a patch: fewer where there are many.
 _MOST_SQUARES, _FEWEST_SQUARES = 10, 1
 _MOST_TRIANGLES = 1_200_000
-# Places through the wall, on the side walls.
-_THROUGH = np.linspace(0.0, 1.0, 3)[np.newaxis]
+# Places through the wall, on the side walls, which may be broad and twisted.
+_THROUGH = np.linspace(0.0, 1.0, 7)[np.newaxis]
 # Cosine of the angle between triangles from which on their common edge is sharp.
 _SHARP = 0.82
 
@@ -96,7 +96,9 @@ def facets_of_wall(wall: Wall) -> Facets:
     parts = []
     for side in SIDES:
         placed = points[wall.patch_net, side] + shifts[:, np.newaxis, np.newaxis]
-        parts.append(_facets_of_grids(placed, normals[wall.patch_net, side], side, backwards=side == 0))
+        # Nets' normals run from side 0 to side 1, and those of facets out of the wall.
+        outward = normals[wall.patch_net, side] * (2 * side - 1)
+        parts.append(facets_of_grids(placed, outward, COLOURS[side], closed=True, surface=side))
     return _joined([*parts, *_side_walls(wall, samples)])
 
 
@@ -114,27 +116,37 @@ def _side_walls(wall: Wall, samples: Floats) -> list[Facets]:
         made.append((both[0, 0], np.cross(both[1, 0], both[0, 1])))
     points, normals = (np.stack(part)[which.ravel()] for part in zip(*made, strict=True))
     placed = points + wall.shifts[wall.patch_shift[patches]][:, np.newaxis, np.newaxis]
-    return [_facets_of_grids(placed, normals, REST)]
+    return [facets_of_grids(placed, normals, COLOURS[REST], closed=True, surface=REST)]
 
 
-def _facets_of_grids(points: Floats, normals: Floats, kind: int, backwards: bool = False) -> Facets:
-    """Triangles of grids, shape (grids, a, b, 3), each a face of one surface; turned round if they face inwards."""
+def facets_of_grids(
+    points: Floats, normals: Floats, colours: ArrayLike, closed: bool = False, surface: int = 0
+) -> Facets:
+    """Triangles of grids of points, each grid a face, all of them one smooth surface.
+
+    Parameters
+    ----------
+    points, normals : ndarray, shape (grids, a, b, 3)
+        Triangles run counterclockwise seen from where the normals point.
+    colours : array-like, shape (3,) or (grids, a, b, 3)
+        Of all, or at each point.
+    closed : bool
+        Whether they are a part of what bounds solids.
+    surface : int
+        The surface's number.
+    """
     corners = []
-    for grid in (points, normals):
+    for grid in (points, normals, np.broadcast_to(np.asarray(colours, dtype=float), points.shape)):
         a, b, c, d = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
         halves = np.stack([np.stack([a, b, c], axis=-2), np.stack([a, c, d], axis=-2)], axis=-3)
         corners.append(halves.reshape(-1, 3, 3))
-    if backwards:
-        corners = [corners[0][:, ::-1], -corners[1][:, ::-1]]
-    count = len(corners[0])
-    return Facets(
-        corners=corners[0],
-        normals=corners[1],
-        colours=np.broadcast_to(COLOURS[kind], (count, 3, 3)),
-        faces=np.repeat(np.arange(len(points)), count // max(len(points), 1)),
-        surfaces=np.full(count, kind),
-        closed=True,
-    )
+    flat = np.cross(corners[0][:, 1] - corners[0][:, 0], corners[0][:, 2] - corners[0][:, 0])
+    backwards = dot(flat, corners[1].sum(axis=1)) < 0
+    for part in corners:
+        part[backwards] = part[backwards, ::-1]
+    faces = np.repeat(np.arange(len(points)), len(flat) // max(len(points), 1))
+    where, upright, coloured = corners
+    return Facets(where, upright, coloured, faces=faces, surfaces=np.full(len(flat), surface), closed=closed)
 
 
 def facets_of_triangles(

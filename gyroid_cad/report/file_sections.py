@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 
 from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, Format, require_format
+from gyroid_cad.common.inputs import unreadable
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.mesh.triangles.files import read_triangles
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_triangles
 
 __all__ = ["FileContents", "file_section", "read_contents"]
@@ -53,8 +56,8 @@ def read_contents(path: str) -> FileContents:
         If it cannot be read.
     """
     target, form = Path(path), require_format("input file", path, PART_FORMATS)
-    if not target.is_file():
-        raise ParameterError("input file", path, "a file that exists")
+    if reason := unreadable(path):
+        raise ParameterError("input file", path, f"a file that exists and can be read: {reason}")
     return _triangles_of(target, form) if form in TRIANGLE_FORMATS else _shape_of(target, form)
 
 
@@ -87,8 +90,6 @@ def _shape_of(path: Path, form: Format) -> FileContents:
 
 
 def _triangles_of(path: Path, form: Format) -> FileContents:
-    from gyroid_cad.mesh.triangles.files import read_triangles
-    from gyroid_cad.mesh.triangles.measures import triangle_measures
 
     vertices, triangles = read_triangles(path)
     found = triangle_measures(vertices, triangles)

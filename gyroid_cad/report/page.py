@@ -78,7 +78,8 @@ def write_page(report: Report, path: str | os.PathLike[str]) -> Path:
     target = require_page(path)
     page = page_of(report)
     with replacing(target) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        # A file's name may hold bytes that are no text.
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace")
     return target
 
 

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field
-from gyroid_cad.report.nearest import WallFaces, distinct, settled, tree_of, wall_faces
+from gyroid_cad.report.inscribed import distinct, settled
 from gyroid_cad.report.wall_thickness import Distribution, distribution_of
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.distances import WallFaces, tree_of, wall_faces
 from gyroid_cad.wall.fitted import FittedWall
 from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.refit import graded_wall
@@ -176,6 +177,8 @@ def inscribed_spheres(fitted: FittedWall) -> tuple[Floats, Floats, Integers]:
 
 def _scene(fitted: FittedWall) -> tuple[_Grid, WallFaces, str]:
     """Scene of the pores: the region looked at, the walls, and what there is beyond the block's sides."""
+    # Where its fields and maps are.
+    fitted = fitted.at_home()
     grading, wall = fitted.spec.grading, fitted.wall
     if grading.uniform:
         return _grid(fitted, 0.0), wall_faces(wall, grading.cell_size), ENDLESS

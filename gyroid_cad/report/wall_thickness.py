@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.nurbs.surface import grid_derivatives
 from gyroid_cad.wall.areas import distinct_patches
+from gyroid_cad.wall.distances import met_along_normals
 from gyroid_cad.wall.exact import differentiation_matrix, grid_rates, offset_patches
 from gyroid_cad.wall.fitted import FittedWall
 
@@ -136,6 +136,8 @@ def wall_thickness(fitted: FittedWall) -> WallThickness:
     -------
     WallThickness
     """
+    # As the exact surface knows it.
+    fitted = fitted.at_home()
     grading, wall = fitted.spec.grading, fitted.wall
     patches, _ = distinct_patches(fitted.wall)
     along = int(np.clip(np.sqrt(_MEASURED / len(patches)), _FEWEST_MEASURED, _MOST_MEASURED))
@@ -144,14 +146,9 @@ def wall_thickness(fitted: FittedWall) -> WallThickness:
     walls, requested, weights = [], [], []
     for some, exact in offset_patches(fitted.complex, grading, nodes, patches):
         chosen = patches[some]
-        faces = grid_derivatives(
-            wall.nets[wall.patch_net[chosen]], wall.weights, (wall.knots, wall.knots), nodes, nodes
-        )
-        normal = exact.normals.reshape(*shape, 3)
-        place = exact.points.reshape(*shape, 3) - wall.shifts[wall.patch_shift[chosen]][:, np.newaxis, np.newaxis]
-        off = faces[0] - place[:, np.newaxis]
-        outwards = np.cross(faces[1], faces[2])
-        met = dot(off, outwards) / dot(outwards, normal[:, np.newaxis])
+        shifts = wall.shifts[wall.patch_shift[chosen]][:, np.newaxis, np.newaxis, np.newaxis]
+        nets = wall.nets[wall.patch_net[chosen]] + shifts
+        met = met_along_normals(nets, wall.weights, wall.knots, nodes, exact)[0]
         middle = exact.points.reshape(*shape, 3)
         area = np.linalg.norm(np.cross(*grid_rates(rate, middle)), axis=-1) * np.outer(gauss, gauss)
         if fitted.spec.trimmed and not grading.uniform:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gyroid_cad.common.tables import Rows, text_table
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.nurbs.roots import line_step
 from gyroid_cad.surface.fit import (
     CELL_SIZE,
     DEGREE,
@@ -27,6 +28,8 @@ __all__ = ["FitReport", "fit_report", "fit_within"]
 _REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
 _FOOT_POINT_STEPS = 4
+# Less than this is rounding, of which the digits differ from machine to machine.
+_ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,7 @@ class FitReport:
             "gap between an edge and its neighbour's / L": self.edge_gap,
             "corners off by / L": self.corner_error,
         }
-        return [(subject, f"{value:.2e}") for subject, value in found.items()]
+        return [(subject, "< 1e-15" if value < _ROUNDING else f"{value:.2e}") for subject, value in found.items()]
 
     def __str__(self) -> str:
         return text_table(self.rows())
@@ -74,12 +77,10 @@ def fit_report(fitted: FittedPatch) -> FitReport:
     foot_u, foot_v = u.copy(), v.copy()
     for _ in range(_FOOT_POINT_STEPS):
         d = fitted.surface.derivatives(foot_u, foot_v)
-        residual = points + distance[:, np.newaxis] * normals - d[0, 0]
-        jacobian = np.stack([d[1, 0], d[0, 1], -normals], axis=-1)
-        step = np.linalg.solve(jacobian, residual[..., np.newaxis])[..., 0]
-        foot_u, foot_v, distance = foot_u + step[:, 0], foot_v + step[:, 1], distance + step[:, 2]
+        step_u, step_v, distance = line_step(d[0, 0] - points, d[1, 0], d[0, 1], normals)
+        foot_u, foot_v = foot_u + step_u, foot_v + step_v
         # Newton's steps square: after one this small nothing is left to gain.
-        if np.max(np.abs(step)) < 1e-8:
+        if max(np.max(np.abs(step_u)), np.max(np.abs(step_v))) < 1e-8:
             break
     sine = np.linalg.norm(np.cross(fitted.surface.normals(foot_u, foot_v), normals), axis=1)
     curvature = fitted.surface.mean_curvature(samples[:, np.newaxis], samples[np.newaxis]) * CELL_SIZE

@@ -1,4 +1,4 @@
-"""The wall: cell complex, grading, offset control nets, and whether they meet themselves."""
+"""The wall: cell complex, grading, offset control nets, their areas and their self-intersection."""
 
 from typing import Any
 

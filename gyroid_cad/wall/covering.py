@@ -13,11 +13,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
+from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
 
@@ -31,7 +33,7 @@ __all__ = [
     "Frame",
     "covering_complex",
     "first_success",
-    "nearest_offsets",
+    "frame_of",
     "patch_sides",
     "periodic_offsets",
     "wall_extremes",
@@ -54,7 +56,7 @@ _OFFSET_SAMPLES = 17
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """Frame of a lattice: p -> rotation p + origin, from its own space to that of the part.
+    """Frame of a lattice: p -> rotation p + origin, from its own space to that of the part, or of the file.
 
     Attributes
     ----------
@@ -74,8 +76,37 @@ class Frame:
         """Points of the lattice's own space in the part's; shape (..., 3)."""
         return points @ self.rotation.T + self.origin
 
+    def within(self, outer: Frame) -> Frame:
+        """Return the frame that this one is, placed by another."""
+        return Frame(outer.placed(self.origin), outer.rotation @ self.rotation)
+
 
 AT_HOME = Frame(np.zeros(3), np.eye(3))
+
+
+def frame_of(origin: Point | Floats, rotation: Point | Floats) -> Frame:
+    """Return the frame of a lattice that is turned and then moved.
+
+    Parameters
+    ----------
+    origin : tuple of float
+        Of the lattice, in mm.
+    rotation : tuple of float
+        Angles in degrees about the fixed axes x, y and z, one turn after the other.
+
+    Examples
+    --------
+    >>> frame_of((1.0, 0.0, 0.0), (0.0, 0.0, 90.0)).placed(np.array([5.0, 0.0, 0.0])).round(12).tolist()
+    [1.0, 5.0, 0.0]
+    """
+    turn = np.eye(3)
+    for axis, angle in enumerate(np.radians(rotation).tolist()):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        about = np.eye(3)
+        about[[i, j], [i, j]] = np.cos(angle)
+        about[j, i], about[i, j] = np.sin(angle), -np.sin(angle)
+        turn = about @ turn
+    return Frame(np.array(origin, dtype=np.float64), turn)
 
 
 def first_success(attempts: Iterable[Callable[[], T]]) -> T:
@@ -209,25 +240,3 @@ def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: Mi
     places, normals = patch_points_and_normals(cell, cell_size, np.linspace(-1, 1, _OFFSET_SAMPLES))
     own = np.mod(frame.own(points), cell_size)
     return nearest_offsets(places, normals, own)[0]
-
-
-def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
-    """Distance of points from samples of a surface, along its normal.
-
-    Parameters
-    ----------
-    places, normals : ndarray, shape (..., 3)
-        Of the surface.
-    points : ndarray, shape (n, 3)
-
-    Returns
-    -------
-    offsets : ndarray, shape (n,)
-    nearest : ndarray of int, shape (n,)
-        Flat indices of the samples.
-    """
-    from scipy.spatial import cKDTree
-
-    places, normals = places.reshape(-1, 3), normals.reshape(-1, 3)
-    nearest = np.asarray(cKDTree(places).query(points)[1], dtype=np.int64)
-    return np.asarray(np.sum((points - places[nearest]) * normals[nearest], axis=1)), nearest

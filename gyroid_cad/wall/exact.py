@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.nurbs.basis import orders
 from gyroid_cad.nurbs.surface import layer_volumes
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER, Placements
@@ -24,6 +25,7 @@ __all__ = [
     "grid_rates",
     "interpolation_matrix",
     "offset_patches",
+    "patch_derivatives",
     "patch_points_and_normals",
     "sampled_point",
 ]
@@ -33,6 +35,7 @@ Integers = NDArray[np.int64]
 
 _QUADRATURE_POINTS = 16
 _BLOCK_POINTS = 4
+_PATCH_NODES = 33
 # So few that what is computed for them stays in the processor's cache.
 _PATCHES_AT_ONCE = 48
 
@@ -104,6 +107,31 @@ def _placed_grid(placements: Placements, cell_size: float, samples: tuple[float,
     turns = np.swapaxes(placements.matrices, 1, 2).astype(float)
     places = points @ turns + (placements.translations * QUARTER)[:, np.newaxis]
     return places * (cell_size / 2), normals @ (turns * placements.sides[:, np.newaxis, np.newaxis])
+
+
+def patch_derivatives(family: Family, u: Floats, v: Floats) -> tuple[Floats, ...]:
+    """Points and derivatives of the exact patch, in its own frame and in bounding-cell lengths.
+
+    Of the polynomials through its values at Chebyshev's nodes: patches are analytic, and to rounding these are the
+    same.
+
+    Parameters
+    ----------
+    family : Family
+    u, v : ndarray, shape (n,)
+
+    Returns
+    -------
+    tuple of ndarray, shape (n, 3)
+        Points, then derivatives by u, v, uu, uv and vv.
+    """
+    nodes = -np.cos(np.pi * np.arange(_PATCH_NODES) / (_PATCH_NODES - 1))
+    values = _exact_grid(tuple(nodes.tolist()), family)[0].reshape(_PATCH_NODES, _PATCH_NODES, 3)
+    rate = differentiation_matrix(nodes)
+    along_u, along_v = (
+        [interpolation_matrix(nodes, x) @ np.linalg.matrix_power(rate, k) for k in range(3)] for x in (u, v)
+    )
+    return tuple(np.einsum("pi,pj,ijc->pc", along_u[k], along_v[m], values) for k, m in orders(2, 2))
 
 
 @lru_cache(maxsize=16)

@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, Timed, timed
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.covering import AT_HOME, PERTURBATIONS, covering_complex, wall_extremes
+from gyroid_cad.wall.covering import AT_HOME, PERTURBATIONS, Frame, covering_complex, frame_of, wall_extremes
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall, build_wall
 from gyroid_cad.wall.refit import Refit, graded_wall, likely_control_points, measured
 from gyroid_cad.wall.self_intersection import CLEARANCE_SAMPLES, FOLD_SAMPLES, require_simple, require_simple_fit
 
-__all__ = ["FittedWall", "LatticeSpec", "fit_spec", "fit_wall", "fitted_wall"]
+__all__ = ["HOME", "FittedWall", "LatticeSpec", "fit_spec", "fit_wall", "fitted_wall"]
 
 
 def fit_wall(
@@ -83,6 +84,7 @@ Floats = NDArray[np.float64]
 _BYTES_PER_CELL = 500_000
 # Of whole cells that are all alike: they have their nets in common, only the complex grows; writing STL included.
 _BYTES_PER_ALIKE_CELL = 40_000
+HOME: Point = (0.0, 0.0, 0.0)
 _SHIFTS = float(np.abs(PERTURBATIONS).max())
 
 
@@ -101,6 +103,8 @@ class LatticeSpec:
         Whether it is cut to the block of cells.
     keep_islands : bool
         Whether pieces that the cut leaves unconnected are kept however small.
+    origin, rotation : tuple of float
+        Where the finished wall is placed, as of :func:`~gyroid_cad.wall.covering.frame_of`.
     """
 
     cells: tuple[int, int, int]
@@ -109,17 +113,29 @@ class LatticeSpec:
     tolerance: float
     trimmed: bool = False
     keep_islands: bool = False
+    origin: Point = HOME
+    rotation: Point = HOME
+
+    @property
+    def frame(self) -> Frame:
+        """Frame that the finished wall is placed by."""
+        return frame_of(self.origin, self.rotation)
+
+    def at_home(self) -> LatticeSpec:
+        """Return the same lattice where it is fitted: unplaced, in the coordinates of its fields and maps."""
+        return replace(self, origin=HOME, rotation=HOME)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedWall:
-    """The wall of a lattice, fitted and found sound.
+    """The wall of a lattice, fitted, found sound, and placed.
 
     Attributes
     ----------
     spec : LatticeSpec
     complex : CellComplex
     wall : Wall
+        Where the spec places it. The exact surface and its fields know nothing of that: see :meth:`at_home`.
     refit : Refit, optional
         What the fit is worth, of a graded wall.
     seconds : dict
@@ -150,14 +166,20 @@ class FittedWall:
         return {"deviation": self.refit.samples**2, "fold": FOLD_SAMPLES**2, "clearance": CLEARANCE_SAMPLES**2}
 
     def bounding_box(self) -> tuple[Floats, Floats]:
-        """Lowest and highest corner of the box round the wall, or of the block it is to be cut to, in mm."""
-        if self.spec.trimmed:
-            return np.zeros(3), np.array(self.spec.cells) * self.spec.grading.cell_size
-        return self.wall.bounding_box()
+        """Lowest and highest corner of the box round the wall, or round the block it is to be cut to, in mm."""
+        if not self.spec.trimmed:
+            return self.wall.bounding_box()
+        corners = np.array(list(np.ndindex(2, 2, 2))) * self.spec.cells * self.spec.grading.cell_size
+        placed = self.spec.frame.placed(corners)
+        return placed.min(axis=0), placed.max(axis=0)
+
+    def at_home(self) -> FittedWall:
+        """Return the wall before it was placed, to be compared with the exact surface, its fields and maps."""
+        return fitted_wall(self.spec.at_home())
 
 
 def fit_spec(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
-    """Fit the wall of a lattice and check that it can exist.
+    """Fit the wall of a lattice, in its own coordinates, and check that it can exist.
 
     Parameters
     ----------
@@ -199,10 +221,14 @@ _fitted: Cache[LatticeSpec, FittedWall] = Cache()
 
 
 def fitted_wall(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
-    """Fit and check the wall of a lattice, as :func:`fit_spec` does; the last few are cached."""
-    # What becomes of pieces is for the solid to know: the wall is the same.
-    alike = replace(spec, keep_islands=False)
-    return replace(_fitted.get(alike, lambda: fit_spec(alike, progress)), spec=spec)
+    """Fit and check the wall of a lattice, as :func:`fit_spec` does, and place it; the last few fits are cached."""
+    # What becomes of pieces is for the solid to know, and where the wall stands for nobody: the fit is the same.
+    home = replace(spec.at_home(), keep_islands=False)
+    fitted = _fitted.get(home, lambda: fit_spec(home, progress))
+    wall = fitted.wall
+    if (spec.origin, spec.rotation) != (HOME, HOME):
+        wall = wall.moved(spec.frame.rotation, spec.frame.origin)
+    return replace(fitted, spec=spec, wall=wall)
 
 
 def _complex(spec: LatticeSpec) -> CellComplex:

@@ -8,23 +8,22 @@ thickness.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.common.graph import runs_on
-from gyroid_cad.nurbs.surface import grid_points
+from gyroid_cad.nurbs.roots import nearest_places
 from gyroid_cad.surface.families import MinimalSurface
-from gyroid_cad.surface.patch import smooth
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.covering import AT_HOME, covering_complex
-from gyroid_cad.wall.exact import patch_points_and_normals
+from gyroid_cad.wall.distances import distances_from_patches, nearest_offsets, nearest_patches
+from gyroid_cad.wall.exact import patch_derivatives, patch_points_and_normals
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.offset import SIDES, Wall
+from gyroid_cad.wall.offset import Wall
 
 __all__ = ["PoreLimits", "narrowest_opening", "network_throats", "pore_limiting_diameter"]
 
@@ -35,15 +34,12 @@ Booleans = NDArray[np.bool_]
 # Nodes along a cell. Throats lie where symmetries of the surface leave points fixed, which are eighths of the cell; and
 # the channels of all three surfaces run along edges and diagonals of the grid, along which its nodes are joined.
 _NODES = 16
-# Samples along a patch's side: of the mid-surface, and of the faces of a graded wall.
-_EXACT_SAMPLES, _FACE_SAMPLES = 25, 9
+# Samples of the mid-surface along a patch's side.
+_EXACT_SAMPLES = 25
 # Nodes whose distances agree so closely, in cell sizes, lie equally far: symmetric ones do, to rounding.
 _EQUALLY_FAR = 1e-9
-# The nearest place is sought in ever smaller grids round the best one, down to a reach whose square is rounding.
-_CLOSER_SAMPLES, _CLOSEST, _NO_NEARER = 17, 1e-8, 1e-14
 # Distances to samples that may yet turn out the least, as a part of the least; and how many are looked at closely.
 _MAY_BE_LEAST, _LOOKED_AT = 1.05, 64
-_PATCHES_AT_ONCE = 4_000
 # Of the 26 steps to the next nodes, across diagonals too, one of each two that are opposite.
 _ONWARD = np.array([step for step in np.ndindex(3, 3, 3) if step > (1, 1, 1)]) - 1
 
@@ -93,30 +89,25 @@ def network_throats(surface: MinimalSurface) -> PoreLimits:
     ----------
     surface : MinimalSurface
     """
-    from scipy.spatial import cKDTree
-
     complex = covering_complex(np.full(3, -0.5), np.full(3, 1.5), AT_HOME, 1.0, 0.0, surface)
     samples = np.linspace(-1, 1, _EXACT_SAMPLES)
     places, normals = (part.reshape(-1, 3) for part in patch_points_and_normals(complex, 1.0, samples))
     nodes = np.stack(np.meshgrid(*3 * [np.arange(_NODES) / _NODES], indexing="ij"), axis=-1).reshape(-1, 3)
-    found = cKDTree(places).query(nodes)
-    distance, nearest = np.asarray(found[0]), np.asarray(found[1])
-    above = np.sum((nodes - places[nearest]) * normals[nearest], axis=1) > 0
-
-    def exact(u: Floats, v: Floats) -> Floats:
-        return smooth(u[:, np.newaxis], v[np.newaxis], surface.family)[0]
-
+    offsets, nearest = nearest_offsets(places, normals, nodes)
+    distance, above = np.linalg.norm(nodes - places[nearest], axis=1), offsets > 0
     chosen, radii = [], []
     for side in (True, False):
         held = _held(np.where(above == side, distance, 0.0).reshape(3 * [_NODES]))
         at = np.flatnonzero((above == side) & (np.abs(distance - held) < _EQUALLY_FAR))
         chosen.append(at)
-        patch = int(nearest[at[0]]) // _EXACT_SAMPLES**2
+        patch, sample = divmod(int(nearest[at[0]]), _EXACT_SAMPLES**2)
         turn = complex.placements.matrices[complex.patch_placement[patch]]
         middle = complex.placements.translations[complex.patch_placement[patch]] / CELL_QUARTERS
         # In the patch's own frame, whose unit is half a cell.
-        own = 2 * (nodes[at[0]] - middle - complex.patch_cell[patch]) @ turn
-        radii.append(_least_distance(exact, own) / 2)
+        own = 2 * (nodes[at[:1]] - middle - complex.patch_cell[patch]) @ turn
+        start_u, start_v = samples[np.array(divmod(sample, _EXACT_SAMPLES))][:, np.newaxis]
+        reached = nearest_places(own, start_u, start_v, partial(patch_derivatives, surface.family))[2]
+        radii.append(float(reached[0]) / 2)
     every = np.concatenate(chosen)
     return PoreLimits(nodes[every], above[every], min(radii))
 
@@ -139,23 +130,14 @@ def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int])
     """
     centres = _throats_of_block(network_throats(grading.surface).centres, cells) * grading.cell_size
     images = grading.carry(centres)[0].T
-    distance, patch = _to_faces(wall, images)
-    least = float(distance.min())
+    distance, patch = nearest_patches(wall, images)
     near = np.argsort(distance)[:_LOOKED_AT]
-    for throat in near[distance[near] <= _MAY_BE_LEAST * least].tolist():
-        # The nearest place may lie just across an edge of the patch with the nearest sample.
-        beside = wall.complex.edge_patches[wall.complex.patch_edges[patch[throat]]]
-        for other in np.unique(beside[beside >= 0]).tolist():
-            point = images[throat] - wall.shifts[wall.patch_shift[other]]
-            least = min(least, *(_from_face(wall, int(wall.patch_net[other]), side, point) for side in SIDES))
-    return 2 * least
-
-
-def _from_face(wall: Wall, net: int, side: int, point: Floats) -> float:
-    def places(u: Floats, v: Floats) -> Floats:
-        return grid_points(wall.nets[net, side], wall.weights, (wall.knots, wall.knots), u, v)
-
-    return _least_distance(places, point)
+    near = near[distance[near] <= _MAY_BE_LEAST * distance.min()]
+    # The nearest place may lie just across an edge of the patch with the nearest sample.
+    beside = wall.complex.edge_patches[wall.complex.patch_edges[patch[near]]].reshape(len(near), -1)
+    which, index = np.nonzero(beside >= 0)
+    pairs = np.unique(np.column_stack([near[which], beside[which, index]]), axis=0)
+    return 2 * float(distances_from_patches(wall, images[pairs[:, 0]], pairs[:, 1]).min())
 
 
 def _throats_of_block(centres: Floats, cells: tuple[int, int, int]) -> Floats:
@@ -163,40 +145,6 @@ def _throats_of_block(centres: Floats, cells: tuple[int, int, int]) -> Floats:
     grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells), indexing="ij"), axis=-1).reshape(-1, 1, 3)
     every = (grid + centres).reshape(-1, 3)
     return np.asarray(every[np.all(every <= np.array(cells), axis=1)])
-
-
-def _to_faces(wall: Wall, points: Floats) -> tuple[Floats, Integers]:
-    """Distances of points from samples of all faces, and to which patches the nearest ones belong."""
-    from scipy.spatial import cKDTree
-
-    samples, knots = np.linspace(-1, 1, _FACE_SAMPLES), (wall.knots, wall.knots)
-    distance, patch = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
-    for first in range(0, wall.complex.patch_count, _PATCHES_AT_ONCE):
-        some = slice(first, first + _PATCHES_AT_ONCE)
-        places = grid_points(wall.nets[wall.patch_net[some]], wall.weights, knots, samples, samples)
-        places = places.reshape(len(places), -1, 3) + wall.shifts[wall.patch_shift[some]][:, np.newaxis]
-        found = cKDTree(places.reshape(-1, 3)).query(points)
-        nearer = np.asarray(found[0]) < distance
-        distance[nearer] = np.asarray(found[0])[nearer]
-        patch[nearer] = first + np.asarray(found[1])[nearer] // places.shape[1]
-    return distance, patch
-
-
-def _least_distance(places: Callable[[Floats, Floats], Floats], point: Floats) -> float:
-    """Distance of a point from a surface on [-1, 1]^2, by ever smaller grids round the nearest place."""
-    u = v = 0.0
-    reach, least = 1.0, np.inf
-    while reach > _CLOSEST:
-        along = np.linspace(-reach, reach, _CLOSER_SAMPLES)
-        us, vs = np.clip(u + along, -1, 1), np.clip(v + along, -1, 1)
-        distance = np.linalg.norm(places(us, vs) - point, axis=-1)
-        i, j = np.unravel_index(int(np.argmin(distance)), distance.shape)
-        nearer = float(distance[i, j]) < least * (1 - _NO_NEARER)
-        u, v, least = float(us[i]), float(vs[j]), min(least, float(distance[i, j]))
-        # At the grid's rim there may be nearer places beyond.
-        at_rim = not {0, _CLOSER_SAMPLES - 1}.isdisjoint((i, j))
-        reach *= 1.0 if at_rim and nearer and reach < 1 else 3 / _CLOSER_SAMPLES
-    return least
 
 
 def _held(distance: Floats) -> float:

@@ -13,12 +13,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import dot, unit
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.nurbs.basis import basis, uniform_knots
-from gyroid_cad.nurbs.surface import edge_row, grid_derivatives
+from gyroid_cad.nurbs.surface import edge_row
 from gyroid_cad.surface.fit import DEGREE, MOST_CONTROL_POINTS, more_control_points
 from gyroid_cad.wall.complex import CellComplex
+from gyroid_cad.wall.distances import met_along_normals
 from gyroid_cad.wall.exact import offset_patches
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
@@ -172,23 +173,20 @@ def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Inte
     Refit
     """
     n = nets.shape[2]
-    knots, weights = (uniform_knots(n),) * 2, np.ones((n, n))
+    knots, weights = uniform_knots(n), np.ones((n, n))
     samples = np.linspace(-1, 1, _CHECKS_PER_SPAN * (n - DEGREE) + 1)
     worst = np.zeros(3)
     min_thickness, max_thickness = np.inf, 0.0
     for some, fitted in offset_patches(complex, grading, samples, patches):
-        points, du, dv = grid_derivatives(nets[some], weights, knots, samples, samples)
-        shape = (len(points), len(samples), len(samples))
+        met, du, dv, across = met_along_normals(nets[some], weights, knots, samples, fitted)
+        shape = (len(met), len(samples), len(samples))
         thickness, normal = fitted.thickness.reshape(shape), fitted.normals.reshape(*shape, 3)
-        half = (thickness / 2)[..., np.newaxis] * normal
-        off = points - fitted.points.reshape(*shape, 3)[:, np.newaxis] - np.stack([-half, half], axis=1)
-        # The fitted faces' own normals: how far off they are, and how far along the exact normal they are met.
-        outwards = _unit(np.cross(du, dv))
-        distance = dot(off, outwards)
-        met = distance / dot(outwards, normal[:, np.newaxis])
-        middle = _unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
+        # From the exact faces, along the fitted faces' own normals.
+        off = met - np.stack([-thickness / 2, thickness / 2], axis=1)
+        distance = off * dot(unit(across), normal[:, np.newaxis])
+        middle = unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
         sine = np.linalg.norm(np.cross(middle, normal), axis=-1)
-        worst = np.maximum(worst, [_largest(distance), _largest((met[:, 1] - met[:, 0]) / thickness), _largest(sine)])
+        worst = np.maximum(worst, [_largest(distance), _largest((off[:, 1] - off[:, 0]) / thickness), _largest(sine)])
         min_thickness, max_thickness = (
             min(min_thickness, float(thickness.min())),
             max(max_thickness, float(thickness.max())),
@@ -232,10 +230,6 @@ def _require_shared_edges(wall: Wall, cell_size: float) -> None:
             f"the edges of neighbouring patches are {gaps[worst]:.2g} mm apart near ({place}) mm of the part: "
             "thickness, density, scale_field and map must be continuous, and the same at both ends that a map joins"
         )
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def _largest(values: Floats) -> float:

@@ -14,9 +14,9 @@ from OCP.TopoDS import TopoDS_Shape
 import gyroid_cad.kernel.check
 import gyroid_cad.kernel.solid
 from gyroid_cad.builds import solid as build_module
-from gyroid_cad.builds.solid import Build, Progress, require_settings
+from gyroid_cad.builds.solid import Build, Progress
 from gyroid_cad.common import memory
-from gyroid_cad.common.formats import PART_FORMATS, listed_endings, require_formats
+from gyroid_cad.common.formats import PART_FORMATS, listed_endings, require_formats, require_settings
 from gyroid_cad.errors import FitError, KernelError, ParameterError
 from gyroid_cad.fields.field import Field
 from gyroid_cad.fields.makers import linear
@@ -64,7 +64,7 @@ def targets(folder: Path, *names: str) -> list[Path]:
 def test_every_stage_is_told_from_nought_to_done_and_timed() -> None:
     told: dict[str, list[tuple[int, int]]] = {}
     made = build(CELLS, 10.0, 0.8, COARSE, lambda stage, done, total: told.setdefault(stage, []).append((done, total)))
-    assert list(told) == ["complex", "fit", "wall", "kernel", "solid", "check"]
+    assert list(told) == ["complex", "fit", "wall", "solid", "check"]
     for steps in told.values():
         assert steps[0] == (0, 1)
         assert steps[-1] == (1, 1)
@@ -76,7 +76,7 @@ def test_every_stage_is_told_from_nought_to_done_and_timed() -> None:
 @pytest.mark.usefixtures("forgotten")
 def test_a_wall_that_varies_is_checked_before_it_is_fitted_and_measured_after() -> None:
     made = build(CELLS, 10.0, linear(0.6, x=0.02), COARSE)
-    assert list(made.seconds) == ["complex", "soundness", "deviation", "fit", "kernel", "solid", "check"]
+    assert list(made.seconds) == ["complex", "soundness", "deviation", "fit", "solid", "check"]
     fitted = made.fitted
     assert fitted.refit is not None
     assert fitted.refit.control_points == len(fitted.wall.weights)
@@ -87,7 +87,7 @@ def test_a_wall_that_varies_is_checked_before_it_is_fitted_and_measured_after() 
 @pytest.mark.usefixtures("forgotten")
 def test_the_control_points_a_varying_wall_takes_are_asked_of_memory_again(monkeypatch: pytest.MonkeyPatch) -> None:
     requested: list[int] = []
-    monkeypatch.setattr(fitted, "require_memory", lambda cells, size, n=10: requested.append(n))
+    monkeypatch.setattr(fitted, "require_memory", lambda cells, size, n=10, **_: requested.append(n))
     made = build_module.build(LatticeSpec(CELLS, Grading(10.0, linear(0.6, x=0.02)), COARSE, 1e-4))
     assert requested[0] == 4 < requested[-1] == len(made.fitted.wall.weights)
 
@@ -155,7 +155,7 @@ def test_a_shape_that_is_not_closed_is_refused(monkeypatch: pytest.MonkeyPatch) 
     def with_open_edges(shape: TopoDS_Shape) -> Topology:
         return Topology(solids=1, faces=84, open_edges=7)
 
-    monkeypatch.setattr(gyroid_cad.kernel.check, "topology", with_open_edges)
+    monkeypatch.setattr(build_module, "topology", with_open_edges)
     with pytest.raises(KernelError, match="7 edges do not bound exactly two faces"):
         build(CELLS, 10.0, 0.8, COARSE)
 
@@ -171,7 +171,7 @@ def test_a_shape_that_encloses_another_volume_than_its_nets_is_refused(
     def wrongly(wall: Wall, progress: Callable[[int, int], None] | None = None) -> TopoDS_Shape:
         return build_solid(wall, progress).Reversed() if wrong == "inside out" else thicker
 
-    monkeypatch.setattr(gyroid_cad.kernel.solid, "build_solid", wrongly)
+    monkeypatch.setattr(build_module, "build_solid", wrongly)
     with pytest.raises(KernelError, match=r"encloses -?[\d.]+ mm3, its control nets [\d.]+ mm3"):
         build(CELLS, 10.0, 0.8, COARSE)
 
@@ -186,7 +186,7 @@ def test_a_build_that_failed_is_not_remembered() -> None:
 
 @pytest.mark.usefixtures("forgotten")
 def test_a_solid_the_kernel_calls_invalid_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gyroid_cad.kernel.check, "is_valid", lambda shape: False)
+    monkeypatch.setattr(build_module, "is_valid", lambda shape: False)
     made = build(CELLS, 10.0, 0.8, COARSE)
     with pytest.raises(KernelError, match="invalid; nothing was written"):
         made.write(targets(tmp_path, "a.step", "a.brep", "a.stl"), "ap214", 0.01, 15.0)
@@ -196,7 +196,7 @@ def test_a_solid_the_kernel_calls_invalid_is_not_written(tmp_path: Path, monkeyp
 @pytest.mark.usefixtures("forgotten")
 def test_the_kernels_check_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     requested: list[TopoDS_Shape] = []
-    monkeypatch.setattr(gyroid_cad.kernel.check, "is_valid", lambda shape: not requested.append(shape))
+    monkeypatch.setattr(build_module, "is_valid", lambda shape: not requested.append(shape))
     made = build(CELLS, 10.0, 0.8, COARSE)
     assert made.valid()
     assert made.valid()

@@ -19,7 +19,7 @@ import pytest
 from gyroid_cad import __version__
 from gyroid_cad.builds import solid as build_module
 from gyroid_cad.cli.app import main
-from gyroid_cad.common import memory
+from gyroid_cad.common import formats, memory
 from gyroid_cad.kernel.check import topology
 from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
@@ -239,7 +239,7 @@ def test_the_config_of_an_assembly_makes_the_same_assembly(capsys: Captured, tmp
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "0"], ["--deviation = 0.0"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "1e-7"], ["--deviation = 1e-07", "mm or more"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--angle", "90"], ["--angle = 90.0"]),
-        (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl, .3mf"]),
+        (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl or .3mf"]),
         (["build", "-o", "a.step", "-o", "./a.step", *ONE_CELL, *WALL], ["-o = ", "each file once"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--instances"], ["-o = 'a.stl'", ".step or .stp"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--trim", "box", "--instances"], ["--instances", "not trimmed"]),
@@ -265,7 +265,7 @@ def test_more_cells_than_memory_holds_are_bad_usage_counted_in_gigabytes(capsys:
 def test_memory_that_suffices_for_the_solid_but_not_for_its_file_is_the_same_error(
     capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    between = memory._BASE_BYTES + (build_module._SOLID_BYTES_PER_CELL + build_module._FILE_BYTES_PER_CELL) / 2
+    between = memory._BASE_BYTES + (build_module._SOLID_BYTES_PER_CELL + formats.FILE_BYTES_PER_CELL) / 2
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=between))
     run = in_process(capsys, "build", "-o", tmp_path / "a.step", *ONE_CELL, *WALL, *COARSE)
     assert_failed(run, 2, tmp_path, "--cells = (1, 1, 1)", "GB are free")

@@ -19,6 +19,12 @@ from gyroid_cad.cli.app import commands, main
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
 
+CONTEXT = click.Context(commands)
+COMMANDS = {
+    name: command for name in commands.list_commands(CONTEXT) if (command := commands.get_command(CONTEXT, name))
+}
+
+
 Captured = pytest.CaptureFixture[str]
 
 # So that each runs in a moment: fewer cells, fewer control points, larger triangles. What is left is as it is printed.
@@ -27,7 +33,7 @@ _QUICK_FIT = ["--control-points", "5"]
 
 
 def examples() -> Iterator[tuple[str, str]]:
-    for name, command in {"": commands, **commands.commands}.items():
+    for name, command in {"": commands, **COMMANDS}.items():
         for line in (command.help or "").splitlines():
             if line.strip().startswith("gyroid-cad"):
                 yield name, line.strip()
@@ -67,7 +73,7 @@ def folder(parts: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
 
 
 def test_every_command_has_examples_of_its_own() -> None:
-    assert {name for name, _ in EXAMPLES} == {"", *commands.commands}
+    assert {name for name, _ in EXAMPLES} == {"", *COMMANDS}
     for name, line in EXAMPLES:
         assert not name or words(line)[0] == name
 
@@ -76,7 +82,7 @@ def test_every_command_has_examples_of_its_own() -> None:
 @pytest.mark.usefixtures("folder")
 def test_every_example_is_understood_as_it_is_printed(name: str, line: str) -> None:
     command, *arguments = words(line)
-    with commands.commands[command].make_context(command, arguments) as context:
+    with COMMANDS[command].make_context(command, arguments) as context:
         assert context.params
         if context.params.get("cells") is not None:
             from gyroid_cad.cli.lattice_options import lattice_of
@@ -96,7 +102,7 @@ def test_every_example_runs_with_fewer_cells(name: str, line: str, folder: Path,
     if name == "view" and "-o" not in arguments:
         # Nobody is there to close a window.
         arguments += ["-o", "view.png"]
-    takes_a_fit = any(option.name == "control_points" for option in commands.commands[arguments[0]].params)
+    takes_a_fit = any(option.name == "control_points" for option in COMMANDS[arguments[0]].params)
     of_a_file = name in ("view", "print-check", "report") and not arguments[1].startswith("-")
     if takes_a_fit and not of_a_file and "--control-points" not in arguments:
         arguments += _QUICK_FIT
@@ -180,7 +186,7 @@ def test_in_bash_itself_the_tab_key_completes_a_command(tmp_path: Path) -> None:
 
 
 def test_commands_are_clicks_and_each_explains_itself() -> None:
-    for command in commands.commands.values():
+    for command in COMMANDS.values():
         assert isinstance(command, click.Command)
         assert command.help
         for option in command.params:

@@ -72,7 +72,11 @@ def test_the_status_is_one_if_it_cannot_be_printed_and_the_scale_is_suggested(ca
     ("arguments", "words"),
     [
         (["print-check", "gone.stl"], "file = 'gone.stl'"),
-        (["print-check", "part.step"], "unexpected extra argument 'part.step'"),
+        (
+            ["print-check", "part.step"],
+            "input file = 'part.step': expected a lattice in a .toml file, or a file ending in",
+        ),
+        (["print-check", "box.stl", "--deviation", "-1"], "--deviation = -1.0: expected a length above 0"),
         (["print-check", "box.stl", "--cells", "1", "1", "1"], "box.stl is a part already: none of --cells"),
         (["print-check", *CELL, "--printer", "lathe"], "--printer = 'lathe': expected form2, or the path"),
         (["print-check", *CELL, "--printer", "gone.toml"], "--printer = 'gone.toml'"),

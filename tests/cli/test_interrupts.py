@@ -1,4 +1,4 @@
-"""Ctrl-C: one line, a status of its own, no partial file, and what was there before untouched."""
+"""Ctrl-C, `kill` and `kill -9`: no partial file if the program is asked, no process left behind however it ends."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import cadquery
@@ -87,6 +88,19 @@ def test_while_the_kernel_writes_step_both_its_temporary_files_go(tmp_path: Path
     only_the_older_file(tmp_path, "a.step")
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_killed_while_the_kernel_writes_step_it_leaves_neither_temporary_file(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    (tmp_path / "a.step").write_text("older")
+    run = started(tmp_path, "build", "-o", "a.step", "--cells", "3", "3", "2", *LARGE[4:])
+    wait_for_partial(run, tmp_path)
+    run.send_signal(number)
+    assert run.communicate(timeout=PATIENCE) == ("", "")
+    assert run.returncode == 128 + number
+    only_the_older_file(tmp_path, "a.step")
+
+
 @pytest.mark.parametrize("seconds", [0.3, 1.2])
 def test_while_it_loads_or_builds_no_file_has_begun(tmp_path: Path, seconds: float) -> None:
     (tmp_path / "a.step").write_text("older")
@@ -96,19 +110,38 @@ def test_while_it_loads_or_builds_no_file_has_begun(tmp_path: Path, seconds: flo
     only_the_older_file(tmp_path, "a.step")
 
 
-def test_while_a_part_is_split_in_processes_all_of_them_end(tmp_path: Path) -> None:
-    cadquery.exporters.export(cadquery.Workplane().circle(15).extrude(20), str(tmp_path / "part.step"))
-    run = started(tmp_path, "fill", "part.step", "-o", "a.step", "--cell-size", "8", "--density", "0.3")
+def splitting(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
+    """The program that splits a part in processes of its own, and those."""
+    cadquery.exporters.export(cadquery.Workplane().circle(15).extrude(20), str(folder / "part.step"))
+    run = started(folder, "fill", "part.step", "-o", "a.step", "--cell-size", "8", "--density", "0.3")
     end, workers = time.monotonic() + PATIENCE, []
-    while not workers and run.poll() is None and time.monotonic() < end:
+    while run.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
-        workers = psutil.Process(run.pid).children()
-    if not workers:
-        run.kill()
-        run.communicate()
-        pytest.skip("one processor: nothing is split in processes")
+        # What reads the part is a program of its own, and is there before, or about to end.
+        with suppress(psutil.Error):
+            workers = [child for child in psutil.Process(run.pid).children() if "fill" in child.cmdline()]
+            if workers:
+                return run, workers
+    run.kill()
+    run.communicate()
+    pytest.skip("one processor: nothing is split in processes")
+
+
+def test_while_a_part_is_split_in_processes_all_of_them_end(tmp_path: Path) -> None:
+    run, workers = splitting(tmp_path)
     interrupted(run)
     assert not psutil.wait_procs(workers, timeout=5)[1]
+    assert [path.name for path in tmp_path.iterdir()] == ["part.step"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is split in processes")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_killed_it_takes_its_processes_with_it_whatever_they_are_at(tmp_path: Path, number: signal.Signals) -> None:
+    run, workers = splitting(tmp_path)
+    run.send_signal(number)
+    run.communicate(timeout=PATIENCE)
+    assert run.returncode == -number
+    assert not psutil.wait_procs(workers, timeout=2)[1]
     assert [path.name for path in tmp_path.iterdir()] == ["part.step"]
 
 

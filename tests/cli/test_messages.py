@@ -7,10 +7,17 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import click
 import pytest
 
 from gyroid_cad.cli.app import commands, main
 from gyroid_cad.lattice import Lattice
+
+CONTEXT = click.Context(commands)
+COMMANDS = {
+    name: command for name in commands.list_commands(CONTEXT) if (command := commands.get_command(CONTEXT, name))
+}
+
 
 Captured = pytest.CaptureFixture[str]
 
@@ -41,7 +48,7 @@ def test_a_traceback_is_shown_for_debugging_and_never_else(capsys: Captured, mon
 
 
 def test_every_command_can_be_debugged() -> None:
-    for command in (commands, *commands.commands.values()):
+    for command in (commands, *COMMANDS.values()):
         assert "--debug" in [name for option in command.params for name in option.opts]
 
 

@@ -10,7 +10,7 @@ import cadquery
 import pytest
 from rich.progress import Progress, TimeRemainingColumn
 
-from gyroid_cad.cli import app as cli
+from gyroid_cad.cli import build as cli_build
 from gyroid_cad.cli import fill as cli_fill
 from gyroid_cad.cli import mesh as cli_mesh
 from gyroid_cad.cli.app import main
@@ -31,7 +31,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Told:
     def listening(shown: bool) -> Iterator[object]:
         yield lambda *step: steps.append(step)
 
-    for module in (cli, cli_fill, cli_mesh):
+    for module in (cli_build, cli_fill, cli_mesh):
         monkeypatch.setattr(module, "shown_progress", listening)
     return steps
 

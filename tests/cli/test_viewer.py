@@ -16,9 +16,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from gyroid_cad.cli import viewer
+from gyroid_cad.cli import view as viewer
 from gyroid_cad.cli.app import main
-from gyroid_cad.cli.viewer import view
+from gyroid_cad.cli.view import view
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
@@ -210,7 +210,7 @@ def test_a_window_holds_each_part_once_and_all_its_places(
 
 _OFF_SCREEN = """
 import sys, cadquery.vis
-from gyroid_cad.cli import viewer
+from gyroid_cad.cli import view as viewer
 show = cadquery.vis.show
 cadquery.vis.show = lambda *things, **look: show(*things, **look, interact=False, screenshot=sys.argv[2])
 viewer.has_display = lambda: True

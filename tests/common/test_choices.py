@@ -19,6 +19,12 @@ from gyroid_cad.filling.wanted import regions_of
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import SURFACES, USUAL
 
+CONTEXT = click.Context(commands)
+COMMANDS = {
+    name: command for name in commands.list_commands(CONTEXT) if (command := commands.get_command(CONTEXT, name))
+}
+
+
 TYPES = {"kind": Kind, "surface": SurfaceName, "trim": Trim | None, "schema": Schema}
 WORDS = {"kind": KINDS, "surface": SURFACE_NAMES, "trim": TRIMS, "schema": SCHEMAS, "fit": FITS}
 DOORS = [
@@ -58,9 +64,9 @@ def test_another_word_is_refused_with_those_there_are() -> None:
         Lattice((1, 1, 1), 10, 0.8, trim="sphere")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", commands.commands)
+@pytest.mark.parametrize("name", COMMANDS)
 def test_the_command_line_asks_for_one_of_the_same_words(name: str) -> None:
-    for option in commands.commands[name].params:
+    for option in COMMANDS[name].params:
         if option.name in WORDS:
             assert isinstance(option.type, click.Choice)
             assert tuple(option.type.choices) == WORDS[option.name]

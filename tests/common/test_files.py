@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -171,3 +175,118 @@ def test_a_parameter_error_is_one_line_however_long_the_value(tmp_path: Path) ->
         require_writable(long_name)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("output = '")
+
+
+@pytest.mark.parametrize("length", [241, 250, 254, 255])
+def test_a_name_as_long_as_the_system_takes_is_written(tmp_path: Path, length: int) -> None:
+    path = require_writable(tmp_path / ("x" * (length - 4) + ".stl"))
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+        temporary.with_name(f"{temporary.name}.raw").write_text("what a kernel wrote")
+        temporary.with_name(f"{temporary.name}.raw").unlink()
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize("name", ["x" * 252 + ".stl", "é" * 127 + ".stl", "/".join(["y" * 200] * 25) + ".stl"])
+def test_a_name_that_the_system_does_not_take_is_refused_and_said_to_be_too_long(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ParameterError, match=r"^output = .*: expected a shorter file name"):
+        require_writable(tmp_path / name)
+
+
+def test_links_that_lead_round_in_a_circle_are_refused(tmp_path: Path) -> None:
+    first, second = tmp_path / "a.stl", tmp_path / "b.stl"
+    first.symlink_to(second)
+    second.symlink_to(first)
+    for path in (first, first / "part.stl"):
+        with pytest.raises(ParameterError, match="its links lead round in a circle"):
+            require_writable(path)
+
+
+def test_a_link_to_a_file_that_is_not_there_yet_is_followed(tmp_path: Path) -> None:
+    link = tmp_path / "link.stl"
+    link.symlink_to(tmp_path / "part.stl")
+    with replacing(require_writable(link)) as temporary:
+        temporary.write_text("new")
+    assert (tmp_path / "part.stl").read_text() == "new"
+    assert link.is_symlink()
+
+
+def test_threads_that_write_one_name_at_once_all_write_it_whole(tmp_path: Path) -> None:
+    path, together, problems = tmp_path / "part.stl", threading.Barrier(4), []
+
+    def write(text: str) -> None:
+        try:
+            with replacing(path) as temporary:
+                temporary.write_text(text[:5])
+                together.wait(10)
+                temporary.write_text(text)
+                together.wait(10)
+        except BaseException as problem:
+            problems.append(problem)
+
+    texts = [letter * 10 for letter in "abcd"]
+    threads = [threading.Thread(target=write, args=(text,)) for text in texts]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not problems
+    assert path.read_text() in texts
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems know no names that are not text")
+def test_a_folder_whose_name_is_not_text_is_reached_by_one_that_is(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    folder.mkdir()
+    with replacing(folder / "part.step") as temporary:
+        assert str(temporary).encode()
+        temporary.write_text("new")
+    assert [(path.name, path.read_text()) for path in folder.iterdir()] == [("part.step", "new")]
+
+
+SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows ends a program without a word to it")
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_that_ends_the_program_leaves_no_temporary_file_and_no_folder(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    program = f"""
+import os, signal, sys
+from gyroid_cad.common.files import replacing, temporary_folder
+with temporary_folder() as folder, replacing("part.stl") as outer, replacing("part.3mf") as inner:
+    for path in (folder / "file", outer, inner):
+        path.write_text("half of it")
+    print(folder, flush=True)
+    os.kill(os.getpid(), {int(number)})
+    signal.pause()
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert run.returncode == 128 + number
+    assert run.stderr == ""
+    assert not Path(run.stdout.strip()).exists()
+    assert not list(tmp_path.iterdir())
+
+
+def test_whoever_answers_a_signal_themselves_keeps_their_answer(tmp_path: Path) -> None:
+    heard: list[int] = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: heard.append(number))
+    try:
+        with replacing(tmp_path / "part.stl") as temporary:
+            temporary.write_text("new")
+            signal.raise_signal(signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert heard == [signal.SIGTERM]
+    assert (tmp_path / "part.stl").read_text() == "new"
+
+
+def test_once_a_file_is_written_signals_are_answered_as_before(tmp_path: Path) -> None:
+    before = [signal.getsignal(number) for number in SIGNALS]
+    with replacing(tmp_path / "part.stl") as temporary:
+        temporary.write_text("new")
+    assert [signal.getsignal(number) for number in SIGNALS] == before

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
 from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError
-from gyroid_cad.filling.fill import Filled, _turn, fill
+from gyroid_cad.filling.fill import Filled, fill
 from gyroid_cad.filling.part import Filling, part_of
 from gyroid_cad.filling.wanted import KINDS
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
@@ -26,6 +26,7 @@ from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.wall.covering import frame_of
 
 TUBE = USUAL.tube
 
@@ -94,7 +95,9 @@ def test_moving_part_and_lattice_together_changes_nothing() -> None:
     assert after.report.volume == pytest.approx(before.report.volume, rel=1e-7)
     assert after.report.faces == before.report.faces
     np.testing.assert_allclose(
-        _turn(np.array(angles)), Rotation.from_euler("xyz", angles, degrees=True).as_matrix(), atol=1e-15
+        frame_of((0.0, 0.0, 0.0), angles).rotation,
+        Rotation.from_euler("xyz", angles, degrees=True).as_matrix(),
+        atol=1e-15,
     )
 
 

@@ -10,7 +10,7 @@ from OCP.TopAbs import TopAbs_FACE
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of, topology
-from gyroid_cad.kernel.coloured import Colour, ColouredPart, coloured_parts, extent_of
+from gyroid_cad.kernel.coloured import ColouredPart, OwnColour, coloured_parts, extent_of
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import write_step
 
@@ -18,7 +18,7 @@ RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 ORANGE = (0.8, 0.4, 0.1)
 
 
-def rounded(colour: Colour) -> Colour:
+def rounded(colour: OwnColour) -> OwnColour:
     return None if colour is None else tuple(round(part, 4) + 0.0 for part in colour)  # type: ignore[return-value]
 
 
@@ -59,7 +59,7 @@ def middles(part: ColouredPart) -> list[tuple[float, ...]]:
 
 
 def test_parts_of_nested_assemblies_are_found_once_and_where_their_places_carry_them(nested: Path) -> None:
-    found: dict[Colour, list[tuple[float, ...]]] = {}
+    found: dict[OwnColour, list[tuple[float, ...]]] = {}
     for part in coloured_parts(nested):
         (colour,) = set(map(rounded, part.colours))
         found[colour] = sorted(found.get(colour, []) + middles(part))

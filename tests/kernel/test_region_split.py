@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 from collections.abc import Callable, Iterable
 from functools import lru_cache
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+from OCP.Standard import Standard_OutOfMemory
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
@@ -177,16 +179,56 @@ def test_what_goes_wrong_in_a_process_is_an_error_of_the_kernel(
         split_by_region(part, cut, 2)
 
 
-@pytest.mark.parametrize("why", ["few faces", "one process", "no fork"])
+@pytest.mark.parametrize("why", ["few faces", "one process"])
 def test_else_all_is_split_at_once(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
     part, cut, _ = subject("ball")
     told: list[tuple[int, int]] = []
     made = Pieces((), ())
     monkeypatch.setattr(regions, "ProcessPoolExecutor", fails)
     monkeypatch.setattr(regions, "split", lambda part, faces: made)
-    if why == "no fork":
-        monkeypatch.setattr(regions.multiprocessing, "get_all_start_methods", lambda: ["spawn"])
     faces = cut[:10] if why == "few faces" else cut
-    processes = 1 if why == "one process" else 2
+    processes = 1 if why == "one process" else None
     assert split_by_region(part, faces, processes, lambda *done: told.append(done)) is made
     assert told == [(len(faces), len(faces))]
+
+
+@pytest.mark.parametrize("why", ["one processor", "another system", "process of a pool"])
+def test_where_no_process_can_be_started_regions_are_split_here_with_the_same_result(
+    why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part, cut, _ = subject("two balls")
+    expected = split_by_region(part, cut, 2)
+    monkeypatch.setattr(regions, "ProcessPoolExecutor", fails)
+    if why == "one processor":
+        monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
+    elif why == "another system":
+        monkeypatch.setattr(regions.sys, "platform", "darwin")
+    else:
+        monkeypatch.setattr(regions.multiprocessing.current_process(), "daemon", True, raising=False)
+    told: list[tuple[int, int]] = []
+    pieces = split_by_region(part, cut, None, lambda *done: told.append(done))
+    assert told[-1] == (len(cut), len(cut))
+    assert len(told) > 2
+    first, second = ([measure(face) for face in [*some.inside, *some.boundary]] for some in (pieces, expected))
+    assert first == second
+
+
+def test_if_no_thread_can_be_started_it_is_an_error_and_no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    part, cut, _ = subject("ball")
+    # As at a limit of memory: the processes are there, the thread that feeds them is not.
+    monkeypatch.setattr("threading.Thread.start", fails)
+    before = multiprocessing.active_children()
+    with pytest.raises(KernelError, match="out of order"):
+        split_by_region(part, cut, 2)
+    assert multiprocessing.active_children() == before
+
+
+def test_memory_that_gives_out_in_a_process_is_told_as_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    part, cut, _ = subject("ball")
+
+    def gives_out(*_: object) -> NoReturn:
+        raise Standard_OutOfMemory("Standard_MMgrRaw::Allocate(): malloc failed")
+
+    monkeypatch.setattr(region_split.RegionSplit, "found", gives_out)
+    with pytest.raises(MemoryError):
+        split_by_region(part, cut, 2)

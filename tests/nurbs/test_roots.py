@@ -1,4 +1,4 @@
-"""Roots of sampled functions, those that hide between samples too."""
+"""Roots of sampled functions, those that hide between samples too; nearest places and lines on a sphere."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gyroid_cad.nurbs.roots import roots
+from gyroid_cad.nurbs.roots import line_step, nearest_places, roots
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -62,3 +62,58 @@ def test_functions_not_near_have_no_roots() -> None:
 def test_no_functions_have_no_roots() -> None:
     which, places = roots(SAMPLES, np.zeros((0, len(SAMPLES))), lambda which, x: (x, x))
     assert len(which) == len(places) == 0
+
+
+def cap(u: Floats, v: Floats) -> tuple[Floats, ...]:
+    """A piece of the unit sphere, by longitude and latitude, with its derivatives."""
+    cu, su, cv, sv, zero = np.cos(u), np.sin(u), np.cos(v), np.sin(v), np.zeros_like(u)
+    vectors = (
+        (cu * cv, su * cv, sv),
+        (-su * cv, cu * cv, zero),
+        (-cu * sv, -su * sv, cv),
+        (-cu * cv, -su * cv, zero),
+        (su * sv, -cu * sv, zero),
+        (-cu * cv, -su * cv, -sv),
+    )
+    return tuple(np.stack(parts, axis=-1) for parts in vectors)
+
+
+@given(st.floats(-0.99, 0.99), st.floats(-0.99, 0.99), st.floats(0.5, 3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
+def test_the_nearest_place_of_a_sphere_lies_under_the_point(
+    u: float, v: float, radius: float, off_u: float, off_v: float
+) -> None:
+    point = radius * cap(np.array([u]), np.array([v]))[0]
+    start = np.clip([u + off_u, v + off_v], -1, 1)
+    found_u, found_v, distance = nearest_places(point, start[:1], start[1:], cap)
+    assert distance[0] == pytest.approx(abs(radius - 1), abs=1e-12)
+    if abs(radius - 1) > 1e-3:
+        assert (found_u[0], found_v[0]) == (pytest.approx(u, abs=1e-6), pytest.approx(v, abs=1e-6))
+
+
+@given(st.floats(1.1, 1.5), st.floats(-0.9, 0.9))
+def test_beyond_the_border_the_nearest_place_is_on_it(u: float, v: float) -> None:
+    point = 2 * cap(np.array([u]), np.array([v]))[0]
+    found_u, found_v, distance = nearest_places(point, np.array([0.8]), np.array([0.0]), cap)
+    along = np.linspace(-1, 1, 20_001)
+    border = cap(np.ones_like(along), along)[0]
+    distances = np.linalg.norm(border - point, axis=-1)
+    assert found_u[0] == 1.0
+    assert distance[0] == pytest.approx(distances.min(), abs=1e-8)
+    assert found_v[0] == pytest.approx(along[np.argmin(distances)], abs=2e-3)
+
+
+@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(0.2, 0.9))
+def test_a_line_meets_a_sphere_after_a_few_steps_and_a_plane_after_one(u: float, v: float, radius: float) -> None:
+    direction, start = cap(np.array([u]), np.array([v]))[0], cap(np.array([0.1]), np.array([0.1]))[0] * 0.1
+    at_u, at_v = np.array([u]), np.array([v])
+    for _ in range(6):
+        place, du, dv = cap(at_u, at_v)[:3]
+        step_u, step_v, distance = line_step(place - start, du, dv, direction)
+        at_u, at_v = at_u + step_u, at_v + step_v
+    met = start + distance[:, np.newaxis] * direction
+    assert np.linalg.norm(met) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(cap(at_u, at_v)[0], met, atol=1e-12)
+    x, y, z = np.eye(3)
+    away, slanted = np.array([0.3, -0.2, radius]), np.array([0.1, 0.2, 1.0])
+    assert line_step(away, x, y, slanted) == pytest.approx((-0.3 + 0.1 * radius, 0.2 + 0.2 * radius, radius))
+    assert z @ away == radius

@@ -13,7 +13,7 @@ from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, El
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS
 from gyroid_cad.wall.complex import CellComplex
 
-__all__ = ["MeshData", "Surface"]
+__all__ = ["MeshData", "Surface", "members"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -141,3 +141,9 @@ class MeshData:
 def _surface(parts: list[tuple[Integers, int]]) -> Surface:
     elements = np.concatenate([elements for elements, _ in parts])
     return Surface(elements, np.concatenate([np.full(len(elements), face) for elements, face in parts]))
+
+
+def members(numbers: Integers, count: int) -> NDArray[np.bool_]:
+    members = np.zeros(count, dtype=bool)
+    members[numbers] = True
+    return members

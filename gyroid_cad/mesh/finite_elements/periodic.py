@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Of what a pair's translation may be off by, in parts of the mesh's size: rounding leaves 1e-15.
+_DIGITS = 12
 _SAME_PLACE = 1e-10
 
 
@@ -36,13 +37,16 @@ class PeriodicPairs:
     blocks : ndarray of int, shape (pairs, 3)
         How many blocks along x, y and z the second lies beyond the first.
     period : ndarray, shape (3,)
-        Of the block, in mm.
+        Of the block along its own axes, in mm.
+    axes : ndarray, shape (3, 3)
+        Those of the block, unit vectors in the columns.
     """
 
     first: Integers
     second: Integers
     blocks: Integers
     period: Floats
+    axes: Floats
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -83,15 +87,17 @@ class PeriodicPairs:
     def equations(self, reference: int) -> Iterator[str]:
         """Give the text of :meth:`write` piece by piece, for a deck of one's own."""
         yield "*EQUATION\n"
-        together = zip(self.first.tolist(), self.second.tolist(), self.blocks.tolist(), strict=True)
-        for first, second, blocks in together:
+        # How far the two lie apart along x, y and z, in periods of the block.
+        spans = np.round(self.blocks * self.period @ self.axes.T / self.period, _DIGITS)
+        together = zip(self.first.tolist(), self.second.tolist(), spans.tolist(), strict=True)
+        for first, second, span in together:
             for axis in range(3):
-                terms = [(second + 1, 1.0), (first + 1, -1.0), *([(reference, -blocks[axis])] if blocks[axis] else [])]
-                line = ",".join(f"{node},{axis + 1},{factor:g}" for node, factor in terms)
+                terms = [(second + 1, 1.0), (first + 1, -1.0), *([(reference, -span[axis])] if span[axis] else [])]
+                line = ",".join(f"{node},{axis + 1},{factor:.{_DIGITS}g}" for node, factor in terms)
                 yield f"{len(terms)}\n{line}\n"
 
 
-def periodic_pairs(mesh: MeshData, cell_size: float) -> PeriodicPairs:
+def periodic_pairs(mesh: MeshData, cell_size: float, axes: Floats | None = None) -> PeriodicPairs:
     """Pair the nodes on the free walls of a block of cells with those where the next block would join.
 
     Free edges that differ by whole blocks are told by their ends' integer coordinates. Where walls or cells vary, only
@@ -102,7 +108,10 @@ def periodic_pairs(mesh: MeshData, cell_size: float) -> PeriodicPairs:
     mesh : MeshData
     cell_size : float
         In mm.
+    axes : ndarray, shape (3, 3), optional
+        Of the block, if it was turned.
     """
+    axes = np.eye(3) if axes is None else axes
     complex = mesh.complex
     inner = mesh.element.order * mesh.subdivisions - 1
     first, second, blocks = _paired_nodes(complex, inner)
@@ -115,9 +124,9 @@ def periodic_pairs(mesh: MeshData, cell_size: float) -> PeriodicPairs:
     there = np.all(pair >= 0, axis=1)
     pair, blocks = pair[there], blocks[there]
     period = np.array(complex.cells) * cell_size
-    apart = mesh.points[pair[:, 1]] - mesh.points[pair[:, 0]] - blocks * period
+    apart = mesh.points[pair[:, 1]] - mesh.points[pair[:, 0]] - blocks * period @ axes.T
     good = np.abs(apart).max(axis=1, initial=0.0) < _SAME_PLACE * np.ptp(mesh.points)
-    return PeriodicPairs(pair[good, 0], pair[good, 1], blocks[good], period)
+    return PeriodicPairs(pair[good, 0], pair[good, 1], blocks[good], period, axes)
 
 
 def _paired_nodes(complex: CellComplex, inner: int) -> tuple[Integers, Integers, Integers]:

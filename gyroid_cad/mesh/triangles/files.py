@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import zlib
 from pathlib import Path
 from typing import Any, TypeVar
+from zipfile import BadZipFile, ZipFile
 
+import lib3mf
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, require_format
+from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ParameterError
 
 __all__ = ["binary_stl_corners", "numbered_corners", "read_triangles"]
@@ -21,6 +25,8 @@ Real = TypeVar("Real", np.float32, np.float64)
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 _HEADER_BYTES = 84
+# Of 3MF, in bytes: 1 GB of it holds about fifteen million triangles, and text of numbers packs ten times or so.
+_MOST_UNPACKED, _MOST_PER_BYTE, _LEAST_ALLOWED = 1_000_000_000, 100, 10_000_000
 _EXPECTED = "a file of triangles, binary or text STL, or 3MF"
 
 
@@ -44,11 +50,8 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
     """
     target = Path(path)
     form = require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
-    try:
-        with target.open("rb") as file:
-            file.read(1)
-    except OSError as problem:
-        raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {problem.strerror}") from None
+    if reason := unreadable(path):
+        raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {reason}")
     vertices, triangles = _read_3mf(target) if form is THREE_MF else numbered_corners(_stl_corners(target))[:2]
     if not len(triangles) or not np.isfinite(vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
@@ -64,6 +67,10 @@ def _stl_corners(path: Path) -> Floats:
         if size == _HEADER_BYTES + count * _RECORD.itemsize:
             return binary_stl_corners(path).astype(float)
     try:
+        with path.open("rb") as file:
+            # What holds no text is not read as a whole, however large it is.
+            if not file.read(_HEADER_BYTES).lstrip().lower().startswith(b"solid"):
+                raise ValueError
         lines = path.read_text(encoding="ascii").split("\n")
         corners = [line.split()[1:] for line in lines if line.lstrip().startswith("vertex")]
         return np.array(corners, dtype=float).reshape(-1, 3, 3)
@@ -101,12 +108,13 @@ def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, B
 
 def _read_3mf(path: Path) -> tuple[Floats, Integers]:
     """Meshes of all parts that are to be built, each where it stands on the platform."""
-    import lib3mf
 
+    _require_bounded_archive(path)
     wrapper = lib3mf.get_wrapper()
     try:
         model = wrapper.CreateModel()
-        model.QueryReader("3mf").ReadFromFile(str(path))
+        with utf8_named(path) as name:
+            model.QueryReader("3mf").ReadFromFile(name)
         # Parts made of others come out as one mesh, placed.
         flat = model.MergeToModel()
         unit = _millimetres(model.GetUnit())
@@ -121,13 +129,32 @@ def _read_3mf(path: Path) -> tuple[Floats, Integers]:
     return np.concatenate([np.zeros((0, 3)), *vertices]), np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles])
 
 
+def _require_bounded_archive(path: Path) -> None:
+    """Refuse a 3MF file that unpacks to more than any part takes, or to what it does not say."""
+    try:
+        with ZipFile(path) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+            if unpacked > min(_MOST_UNPACKED, _LEAST_ALLOWED + _MOST_PER_BYTE * path.stat().st_size):
+                raise ParameterError(
+                    "file",
+                    str(path),
+                    f"3MF that unpacks to at most {_MOST_UNPACKED / 1e6:g} MB and {_MOST_PER_BYTE} times its own size; "
+                    f"it says {unpacked / 1e6:.4g} MB",
+                )
+            # No more is unpacked of an entry than it says: if that is not all of it, its checksum fails.
+            damaged = archive.testzip()
+    except (BadZipFile, RuntimeError, EOFError, OSError, zlib.error) as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: it is no sound zip archive: {problem}") from None
+    if damaged is not None:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: {damaged} in it is damaged")
+
+
 def _array(structures: Any, kind: str) -> NDArray[Any]:
     """The library's vertices or triangles, three numbers each, as an array."""
     return np.frombuffer(bytearray(b"".join(map(bytes, structures))), kind).reshape(-1, 3)
 
 
 def _millimetres(unit: Any) -> float:
-    import lib3mf
 
     sizes = {
         lib3mf.ModelUnit.MicroMeter: 1e-3,

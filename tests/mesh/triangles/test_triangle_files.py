@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import time
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import lib3mf
 import numpy as np
@@ -88,9 +92,9 @@ def test_triangles_without_area_are_left_out(tmp_path: Path) -> None:
         ("a.obj", b"", "ending in .stl or .3mf"),
         ("a.stl", b"solid of nothing", "with triangles of finite size in it"),
         ("a.stl", b"\xff\xfe not text", "a file of triangles"),
-        ("a.stl", b"vertex 1 2\n", "a file of triangles"),
-        ("a.stl", b"vertex 0 0 nan\nvertex 1 0 0\nvertex 0 1 0\n", "of finite size"),
-        ("a.3mf", b"PK no archive", "lib3mf says"),
+        ("a.stl", b"solid\nvertex 1 2\n", "a file of triangles"),
+        ("a.stl", b"solid\nvertex 0 0 nan\nvertex 1 0 0\nvertex 0 1 0\n", "of finite size"),
+        ("a.3mf", b"PK no archive", "no sound zip archive"),
         ("gone.stl", None, "No such file"),
     ],
 )
@@ -103,3 +107,49 @@ def test_what_holds_no_triangles_is_refused_in_one_line(
         read_triangles(tmp_path / name)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def archive_of(path: Path, content: bytes, times: int = 1) -> None:
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive, archive.open("3D/3dmodel.model", "w") as entry:
+        for _ in range(times):
+            entry.write(content)
+
+
+def test_an_archive_that_unpacks_to_gigabytes_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.3mf"
+    archive_of(path, b" " * 10_000_000, 25)
+    start = time.perf_counter()
+    with pytest.raises(ParameterError, match=r"bomb\.3mf.*at most 1000 MB and 100 times its own size; it says 250 MB"):
+        read_triangles(path)
+    assert time.perf_counter() - start < 1
+
+
+def test_an_archive_that_holds_more_than_it_says_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "liar.3mf"
+    archive_of(path, b" " * 20_000_000)
+    content = path.read_bytes()
+    true, said = ((size).to_bytes(4, "little") for size in (20_000_000, 1000))
+    assert true in content
+    path.write_bytes(content.replace(true, said))
+    with pytest.raises(ParameterError, match=r"no sound zip archive|is damaged"):
+        read_triangles(path)
+
+
+def test_what_is_no_text_is_not_read_as_text_however_large(tmp_path: Path) -> None:
+    path = tmp_path / "a.stl"
+    with path.open("wb") as file:
+        file.truncate(10**12)
+    with pytest.raises(ParameterError, match="a file of triangles"):
+        read_triangles(path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere file names are Unicode, and there is no such device")
+@pytest.mark.parametrize("ending", [b"stl", b"3mf"])
+def test_a_name_that_is_no_utf_8_is_read_and_a_device_is_not(tmp_path: Path, ending: bytes) -> None:
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9." + ending))
+    Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(5)).write(path, deviation=0.2)
+    assert triangle_measures(*read_triangles(path)).closed
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(ParameterError, match="it is a device or a pipe"):
+        read_triangles(path)

@@ -1,4 +1,8 @@
-"""Nearest points of the wall's faces: samples of the faces, and their shape round them."""
+"""Distances between points and a wall: nearest samples, feet of perpendiculars, and lines that meet the faces.
+
+Three grades of the same question: :func:`nearest_offsets` takes the nearest sample for the foot, :class:`WallFaces`
+goes on from samples by one step, :func:`distances_from_patches` goes on to rounding.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, freeze_arrays
-from gyroid_cad.nurbs.surface import grid_derivatives
+from gyroid_cad.nurbs.roots import foot_step, nearest_places
+from gyroid_cad.nurbs.surface import grid_derivatives, grid_points, point_derivatives
+from gyroid_cad.wall.grading import WallPoints
 from gyroid_cad.wall.offset import SIDES, Wall
 
-__all__ = ["Feet", "WallFaces", "distinct", "settled", "tree_of", "wall_faces"]
+__all__ = [
+    "Feet",
+    "WallFaces",
+    "distances_from_patches",
+    "met_along_normals",
+    "nearest_offsets",
+    "nearest_patches",
+    "tree_of",
+    "wall_faces",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,6 +36,10 @@ Booleans = NDArray[np.bool_]
 # Samples of all faces together, which take 250 bytes each.
 _MOST_SAMPLES = 800_000
 _FEWEST_STEPS, _MOST_STEPS = 6, 48
+# Along a patch's side, of the faces alone; and how many patches at a time.
+_PATCH_SAMPLES, _PATCHES_AT_ONCE = 9, 4_000
+# Samples of a face from which its nearest place is looked for.
+_STARTS = 6
 # So many queries and neighbours at a time that what is computed for them stays small.
 _PAIRS_AT_ONCE = 200_000
 # In steps between samples: the foot belongs to the nearest sample along each side, and a little is overlap.
@@ -95,8 +114,8 @@ class WallFaces:
     def feet(self, places: Floats, neighbours: int) -> Feet:
         """Feet on the faces of perpendiculars from places, one near each of the nearest samples.
 
-        From the sample one step of Newton's method for the foot (The NURBS Book, eq. (6.6)), with the surface taken as
-        its quadratic there: so the distance is true to the third order of the samples' spacing.
+        From the sample one step of :func:`~gyroid_cad.nurbs.roots.foot_step`, with the surface taken as its quadratic
+        there: so the distance is true to the third order of the samples' spacing.
 
         Parameters
         ----------
@@ -117,13 +136,8 @@ class WallFaces:
         if self.period is not None:
             apart -= self.period * np.round(apart / self.period)
         du, dv, duu, duv, dvv = self.derivatives[:, nearest]
-        a, b, c = dot(du, du) - dot(apart, duu), dot(du, dv) - dot(apart, duv), dot(dv, dv) - dot(apart, dvv)
-        along_u, along_v = dot(apart, du), dot(apart, dv)
-        determinant = a * c - b * b
         # Past the centre of curvature there is no foot nearby: the sample itself stands for it.
-        sound = (determinant > 0) & (a > 0)
-        determinant = np.where(sound, determinant, 1.0)
-        u, v = (c * along_u - b * along_v) / determinant, (a * along_v - b * along_u) / determinant
+        u, v, sound = foot_step(apart, du, dv, duu, duv, dvv)
         # A foot further away is that of another sample, and known better from there.
         sound &= np.maximum(np.abs(u), np.abs(v)) <= _OWN_FOOT * self.step
         u, v = (np.where(sound, along, 0.0)[..., np.newaxis] for along in (u, v))
@@ -165,80 +179,120 @@ def wall_faces(wall: Wall, period: float | None) -> WallFaces:
     return WallFaces(points, derivatives, normals, side, 2 / steps, period, tree_of(points, period))
 
 
-def tree_of(points: Floats, period: float | None) -> Any:
+def tree_of(points: Floats, period: float | None = None) -> Any:
     """A tree in which to look up points (``scipy.spatial.cKDTree``), which repeat if there is a period."""
     from scipy.spatial import cKDTree
 
     return cKDTree(points, boxsize=period)  # type: ignore[arg-type]
 
 
-# Samples of the walls looked at round a centre, which is as near to three walls or more.
-_TOUCHING = 200
-# Centres are moved until the radius they gain is this part of the grid's spacing; coarser where they are many.
-_SETTLED, _SETTLED_ENOUGH = 1e-6, 1e-3
-_MANY = 100
-_MOST_MOVES = 40
-# One step of the linear programme must give this part of what it promises, or the next is to be shorter.
-_KEPT_PROMISE = 0.25
+def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:
+    """Distance of points from samples of a surface, along its normal.
 
+    Parameters
+    ----------
+    places, normals : ndarray, shape (..., 3)
+        Of the surface.
+    points : ndarray, shape (n, 3)
 
-def settled(faces: WallFaces, centres: Floats, radii: Floats, spacing: float) -> tuple[Floats, Floats]:
-    """Move centres until their spheres are as large as they get.
-
-    The radius is the least of the distances to the feet, and each of these grows with the way along its own
-    direction: a linear programme says where all of them grow most, within a step that gets shorter where it promised
-    too much (sequential linear programming).
+    Returns
+    -------
+    offsets : ndarray, shape (n,)
+    nearest : ndarray of int, shape (n,)
+        Flat indices of the samples.
     """
-    centres, radii = centres.copy(), radii.copy()
-    reach = np.full(len(centres), spacing / 2)
-    moving = np.arange(len(centres))
-    least = spacing * (_SETTLED if len(centres) <= _MANY else _SETTLED_ENOUGH)
-    for _ in range(_MOST_MOVES):
-        steps, gains = _best_steps(faces.feet(centres[moving], _TOUCHING), reach[moving])
-        tried, outside, _ = faces.feet(centres[moving] + steps, _TOUCHING).nearest()
-        better = outside & (tried > radii[moving])
-        promised = better & (tried - radii[moving] >= _KEPT_PROMISE * gains)
-        centres[moving[better]] += steps[better]
-        radii[moving[better]] = tried[better]
-        reach[moving[~promised]] /= 4
-        moving = moving[(gains > least) & (reach[moving] > least)]
-        if not len(moving):
-            break
-    return centres, radii
+    places, normals = places.reshape(-1, 3), normals.reshape(-1, 3)
+    nearest = np.asarray(tree_of(places).query(points)[1], dtype=np.int64)
+    return dot(points - places[nearest], normals[nearest]), nearest
 
 
-def _best_steps(feet: Feet, reach: Floats) -> tuple[Floats, Floats]:
-    """Steps, each coordinate within reach, that let the least distance to the feet grow most, and by how much.
+def nearest_patches(wall: Wall, points: Floats) -> tuple[Floats, Integers]:
+    """Distances of points from the nearest samples of all faces, and the patches these are of.
 
-    The programmes of all centres are solved as one: nothing joins them but that their gains are added.
+    Parameters
+    ----------
+    wall : Wall
+    points : ndarray, shape (n, 3)
+        In mm.
+
+    Returns
+    -------
+    distance : ndarray, shape (n,)
+        In mm.
+    patch : ndarray of int, shape (n,)
     """
-    from scipy.optimize import linprog
-    from scipy.sparse import csr_array
-
-    count = len(feet.distance)
-    nearest = np.arange(_TOUCHING) == np.argmin(feet.distance, axis=1)[:, np.newaxis]
-    which, foot = np.nonzero(feet.found | nearest)
-    distance = feet.distance[which, foot]
-    # r - (away / distance) . step <= distance, in the unknowns x, y, z and r of each centre.
-    values = np.column_stack([-feet.away[which, foot] / distance[:, np.newaxis], np.ones(len(which))])
-    columns = 4 * which[:, np.newaxis] + np.arange(4)
-    rows = csr_array((values.ravel(), columns.ravel(), 4 * np.arange(len(which) + 1)), shape=(len(which), 4 * count))
-    bounds = np.repeat(np.column_stack([-reach, reach]), 4, axis=0)
-    bounds[3::4] = [-np.inf, np.inf]
-    gain = np.tile([0.0, 0.0, 0.0, -1.0], count)
-    # SciPy takes sparse rows, which its stubs do not know.
-    best: Any = linprog(gain, rows, distance, bounds=bounds)  # type: ignore[call-overload]
-    if best.status != 0:
-        return np.zeros((count, 3)), np.zeros(count)
-    found = best.x.reshape(count, 4)
-    return found[:, :3], found[:, 3] - feet.distance.min(axis=1)
+    samples, knots = np.linspace(-1, 1, _PATCH_SAMPLES), (wall.knots, wall.knots)
+    distance, patch = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
+    for first in range(0, wall.complex.patch_count, _PATCHES_AT_ONCE):
+        some = slice(first, first + _PATCHES_AT_ONCE)
+        places = grid_points(wall.nets[wall.patch_net[some]], wall.weights, knots, samples, samples)
+        places = places.reshape(len(places), -1, 3) + wall.shifts[wall.patch_shift[some]][:, np.newaxis]
+        found = tree_of(places.reshape(-1, 3)).query(points)
+        nearer = np.asarray(found[0]) < distance
+        distance[nearer] = np.asarray(found[0])[nearer]
+        patch[nearer] = first + np.asarray(found[1])[nearer] // places.shape[1]
+    return distance, patch
 
 
-def distinct(centres: Floats, radii: Floats, apart: float, period: float | None) -> Integers:
-    """Keep the largest of spheres with nearly one centre."""
-    order = np.argsort(-radii, kind="stable")
-    tree = tree_of(centres[order], period)
-    kept = np.ones(len(order), dtype=bool)
-    for first, second in tree.query_pairs(apart, output_type="ndarray"):
-        kept[max(first, second)] = False
-    return np.sort(order[kept])
+def distances_from_patches(wall: Wall, points: Floats, patches: Integers) -> Floats:
+    """Distance of each point from both faces of a patch of its own, to rounding.
+
+    Parameters
+    ----------
+    wall : Wall
+    points : ndarray, shape (n, 3)
+        In mm.
+    patches : ndarray of int, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        From the nearer of the two, in mm.
+    """
+    knots, samples = (wall.knots, wall.knots), np.linspace(-1, 1, _PATCH_SAMPLES)
+    nets = wall.nets[wall.patch_net[patches]].reshape(-1, *wall.nets.shape[2:])
+    own = np.repeat(points - wall.shifts[wall.patch_shift[patches]], len(SIDES), axis=0)
+    apart = grid_points(nets, wall.weights, knots, samples, samples).reshape(len(nets), -1, 3) - own[:, np.newaxis]
+    # From several samples: the nearest one may be a saddle of the distance.
+    starts = np.argpartition(dot(apart, apart), _STARTS, axis=1)[:, :_STARTS].ravel()
+    face, (u, v) = np.repeat(np.arange(len(nets)), _STARTS), samples[np.stack(np.divmod(starts, len(samples)))]
+
+    def derivatives(u: Floats, v: Floats) -> tuple[Floats, ...]:
+        found = point_derivatives(nets, wall.weights, knots, u.reshape(-1, _STARTS), v.reshape(-1, _STARTS), 2)
+        return tuple(values.reshape(-1, 3) for values in found)
+
+    distance = nearest_places(own[face], u, v, derivatives)[2]
+    return np.asarray(distance.reshape(len(points), -1).min(axis=1))
+
+
+def met_along_normals(
+    nets: Floats, weights: Floats, knots: Floats, samples: Floats, exact: WallPoints
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Distances along the exact normals to the two fitted faces, each taken for its tangent plane.
+
+    The plane is that at the same parameters, less than the fit's own deviation away: what that leaves out goes with
+    the square of the deviation.
+
+    Parameters
+    ----------
+    nets : ndarray, shape (patches, 2, n, n, 3)
+        In mm.
+    weights, knots : ndarray
+        Of the nets.
+    samples : ndarray, shape (m,)
+        Along each side of a patch.
+    exact : WallPoints
+        The mid-surface at the samples of these patches.
+
+    Returns
+    -------
+    met : ndarray, shape (patches, 2, m, m)
+        From the mid-surface, in mm, with their signs.
+    du, dv, across : ndarray, shape (patches, 2, m, m, 3)
+        Derivatives of the faces there, and du x dv.
+    """
+    points, du, dv = grid_derivatives(nets, weights, (knots, knots), samples, samples)
+    shape = (len(nets), 1, len(samples), len(samples), 3)
+    middle, normal = exact.points.reshape(shape), exact.normals.reshape(shape)
+    across = np.cross(du, dv)
+    return dot(points - middle, across) / dot(normal, across), du, dv, across

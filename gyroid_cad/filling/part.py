@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.kernel.apart import read_shape
@@ -34,8 +34,6 @@ __all__ = ["Filling", "Made", "Outcome", "part_of", "without_islands"]
 
 Floats = NDArray[np.float64]
 
-# Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
-_BOUNDARY_SPACING = 1 / 12
 # An estimate of the volume from so many points; further off than so many of its deviations, something is wrong.
 _ESTIMATE_POINTS, _ESTIMATE_DEVIATIONS, _ESTIMATE_ERROR = 4096, 6.0, 0.02
 # Of the layer round a bare surface whose volume tells its area, in cell sizes.
@@ -187,7 +185,7 @@ class Filling:
     def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
 
         with self.timed("cover"):
-            sides = infill.sides(self._distance_from_boundary(), self.core.contains)
+            sides = infill.sides(PartExtent(self.core, self.cell_size).clearance, self.core.contains)
         made = {}
         for region in self.regions:
             with self.timed("faces"):
@@ -217,12 +215,6 @@ class Filling:
                     for shape in shapes
                 ]
         return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
-
-    def _distance_from_boundary(self) -> Callable[[Floats], Floats]:
-
-        samples, error = self.core.surface_samples(_BOUNDARY_SPACING * self.cell_size)
-        tree = cKDTree(samples)
-        return lambda points: np.asarray(tree.query(points)[0]) - error
 
     def _require_right_size(self, infill: Infill, region: Region, made: list[Made], points: Floats) -> None:
         """Compare with an estimate that asks no boolean: how many of the points in the part lie in the region."""

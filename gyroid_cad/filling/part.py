@@ -38,6 +38,8 @@ Floats = NDArray[np.float64]
 _ESTIMATE_POINTS, _ESTIMATE_DEVIATIONS, _ESTIMATE_ERROR = 4096, 6.0, 0.02
 # Of the layer round a bare surface whose volume tells its area, in cell sizes.
 _SURFACE_LAYER = 0.05
+# In mm. The kernel's sections of the two faces of a thinner wall run into each other.
+_THIN_WALL = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +142,13 @@ class Filling:
         infill = self.infill_in(replace(frame, origin=frame.origin + shift), self.timed)
         # A block's own side walls are none of the faces that sections are found of.
         by_sections = by_sections and infill.endless
-        made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
+        try:
+            made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
+        except KernelError as failed:
+            if infill.min_thickness >= _THIN_WALL or all(region.surface for region in self.regions):
+                raise
+            thin = f"{infill.min_thickness:.3g} mm"
+            raise KernelError(f"{failed}; the wall is {thin} where it is thinnest, too thin to be cut") from failed
         with self.timed("check"):
             for region in self.regions:
                 self._require_right_size(infill, region, made[region.name], points)

@@ -33,6 +33,7 @@ __all__ = [
     "BoxExtent",
     "Frame",
     "PlacedExtent",
+    "block_extent",
     "covering_complex",
     "first_success",
     "frame_of",
@@ -83,29 +84,26 @@ class Frame:
         return Frame(outer.placed(self.origin), outer.rotation @ self.rotation)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class BoxExtent:
-    """A box in space.
+    """A box in space, along the axes.
 
     Attributes
     ----------
-    axes : ndarray, shape (3, 3)
-        Its directions, unit vectors in the columns.
-    low, high : ndarray, shape (3,)
-        Along them, in mm.
+    low, high : tuple of float
+        Of its corners, in mm.
 
     Examples
     --------
-    >>> box = BoxExtent(np.eye(3), np.zeros(3), np.full(3, 10.0))
+    >>> box = BoxExtent((0.0, 0.0, 0.0), (10.0, 10.0, 10.0))
     >>> box.contains(np.array([[5.0, 5.0, 5.0], [5.0, 5.0, 10.5]])).tolist()
     [True, False]
     >>> box.near(np.array([[5.0, 5.0, 10.5]]), 1.0).tolist()
     [True]
     """
 
-    axes: Floats
-    low: Floats
-    high: Floats
+    low: Point
+    high: Point
 
     def contains(self, points: Floats) -> Booleans:
         return np.asarray(self._outside(points) < 0)
@@ -115,8 +113,7 @@ class BoxExtent:
 
     def _outside(self, points: Floats) -> Floats:
         """How far the points are beyond the side that they are furthest beyond, in mm; below 0 inside."""
-        along = points @ self.axes
-        return np.asarray(np.maximum(self.low - along, along - self.high).max(axis=-1))
+        return np.asarray(np.maximum(np.array(self.low) - points, points - np.array(self.high)).max(axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,6 +131,13 @@ class PlacedExtent:
 
 
 AT_HOME = Frame(np.zeros(3), np.eye(3))
+
+
+def block_extent(cells: tuple[int, int, int], cell_size: float) -> BoxExtent:
+    """A block of cells, with as much round it as :data:`PERTURBATIONS` may shift the lattice by."""
+    margin = max(max(map(abs, shift)) for shift in PERTURBATIONS) * cell_size
+    x, y, z = (count * cell_size + margin for count in cells)
+    return BoxExtent((-margin, -margin, -margin), (x, y, z))
 
 
 def frame_of(origin: Point | Floats, rotation: Point | Floats) -> Frame:

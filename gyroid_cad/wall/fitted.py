@@ -14,15 +14,7 @@ from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, Timed, timed
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import CellComplex, build_complex
-from gyroid_cad.wall.covering import (
-    AT_HOME,
-    PERTURBATIONS,
-    BoxExtent,
-    Frame,
-    covering_complex,
-    frame_of,
-    wall_extremes,
-)
+from gyroid_cad.wall.covering import AT_HOME, PERTURBATIONS, Frame, covering_complex, frame_of, wall_extremes
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall, build_wall
 from gyroid_cad.wall.refit import Refit, graded_wall, likely_control_points, measured
@@ -129,12 +121,6 @@ class LatticeSpec:
         """Frame that the finished wall is placed by."""
         return frame_of(self.origin, self.rotation)
 
-    def block(self) -> BoxExtent:
-        """Return the block of cells, where it is fitted, with as much round it as the lattice may be shifted by."""
-        margin = _SHIFTS * self.grading.cell_size
-        high = np.array(self.cells) * self.grading.cell_size
-        return BoxExtent(np.eye(3), np.full(3, -margin), high + margin)
-
     def at_home(self) -> LatticeSpec:
         """Return the same lattice where it is fitted: unplaced, in the coordinates of its fields and maps."""
         return replace(self, origin=HOME, rotation=HOME)
@@ -218,13 +204,11 @@ def fit_spec(spec: LatticeSpec, progress: Progress | None = None) -> FittedWall:
         kernel=False,
     )
     seconds: dict[str, float] = {}
-    # Patches reach out of a block that is cut from them: there nothing is asked of the wall.
-    grading = replace(spec.grading, extent=spec.block()) if spec.trimmed else spec.grading
     with timed(seconds, "complex", progress):
-        complex = _complex(spec, grading)
+        complex = _complex(spec)
     wall, refit = fit_wall(
         complex,
-        grading,
+        spec.grading,
         spec.settings,
         spec.tolerance,
         lambda stage: timed(seconds, stage, progress),
@@ -247,7 +231,8 @@ def fitted_wall(spec: LatticeSpec, progress: Progress | None = None) -> FittedWa
     return replace(fitted, spec=spec, wall=wall)
 
 
-def _complex(spec: LatticeSpec, grading: Grading) -> CellComplex:
+def _complex(spec: LatticeSpec) -> CellComplex:
+    grading = spec.grading
     if not spec.trimmed:
         return build_complex(spec.cells, grading.surface.cell, grading.closed)
     low, high = np.zeros(3), np.array(spec.cells) * grading.cell_size

@@ -29,8 +29,9 @@ Integers = NDArray[np.int64]
 _STEP = 2e-4
 # In mm. The kernel takes lengths under 1e-7 mm for nothing; this keeps every wall well above.
 THINNEST_WALL = 1e-4
-# How far below zero a wall goes on beyond the part, in parts of the thickest, or densest, there may be.
-_BEYOND_ZERO = 0.5
+# How far below zero a wall goes on beyond the part as it comes, and how far then at most, in parts of the thickest, or
+# densest, there may be.
+_AS_IT_COMES, _AT_MOST = 0.1, 0.4
 
 
 class Extent(Protocol):
@@ -41,6 +42,10 @@ class Extent(Protocol):
 
     def near(self, points: Floats, reach: Floats | float) -> Booleans:
         """Mask of the points that lie inside or within a reach of it, in mm; it may hold some a little further off."""
+
+
+# Of places that may or may not be wanted, so many are asked for at first.
+_ASKED_FIRST = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,21 +242,44 @@ class Grading:
 
     def extremes(self, fitted: WallPoints, thinnest: float, thickest: float) -> tuple[float, float]:
         """The thinnest and the thickest wall so far, in mm, and at more points where it is wanted."""
-        thickness = fitted.thickness
-        low = thickness[self.wanted(thickness < thinnest, fitted.points)]
-        high = thickness[self.wanted(thickness > thickest, fitted.points, thickness / 2)]
-        return min(thinnest, float(low.min(initial=np.inf))), max(thickest, float(high.max(initial=0.0)))
+        points, thickness = fitted.points, fitted.thickness
+        return -self.largest(-thickness, -thinnest, points), self.largest(thickness, thickest, points, thickness / 2)
 
-    def _wanted(self, bad: Booleans, points: Floats, reach: float = 0.0) -> Integers:
+    def largest(self, values: Floats, so_far: float, points: Floats, reach: Floats | float = 0.0) -> float:
+        """The largest of some values, and of those so far, where a wall that reaches so far is wanted.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+        so_far : float
+        points, reach
+            As of :meth:`wanted`.
+        """
+        larger = np.flatnonzero(~(values <= so_far))
+        if not len(larger):
+            return so_far
+        # From the largest down, for one place where it is wanted is enough.
+        larger = larger[np.argsort(-values[larger], kind="stable")]
+        asked, many = 0, _ASKED_FIRST
+        while asked < len(larger):
+            some = larger[asked : asked + many]
+            reaches = np.asarray(reach)[some] if np.ndim(reach) else reach
+            found = self._wanted(np.ones(len(some), dtype=bool), points[some], reaches)
+            if len(found):
+                return float(values[some[found[0]]])
+            asked, many = asked + many, 4 * many
+        return so_far
+
+    def _wanted(self, bad: Booleans, points: Floats, reach: Floats | float = 0.0) -> Integers:
         return np.flatnonzero(self.wanted(bad, points, reach))
 
     def _going_on(self, values: Floats, largest: float) -> Floats:
         """The values, and beyond the extent such as are no worse than a wall that is turned inside out a little."""
         if self.extent is None:
             return values
-        most = _BEYOND_ZERO * largest
-        below = most * np.tanh(np.minimum(values, 0) / most)
-        return np.asarray(np.where(values < 0, below, np.minimum(values, largest)))
+        least, more = -_AS_IT_COMES * largest, _AT_MOST * largest
+        below = least - more * np.tanh((least - np.minimum(values, least)) / more)
+        return np.asarray(np.where(values < least, below, np.minimum(values, largest)))
 
     def _thickness(self, points: Floats, spacing: Floats | float) -> Floats:
         requested = self.requested(points)

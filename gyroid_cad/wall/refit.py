@@ -185,11 +185,12 @@ def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Inte
         thickness, normal = fitted.thickness.reshape(shape), fitted.normals.reshape(*shape, 3)
         # From the exact faces, along the fitted faces' own normals.
         off = met - np.stack([-thickness / 2, thickness / 2], axis=1)
-        distance = off * dot(unit(across), normal[:, np.newaxis])
+        distance = np.abs(off * dot(unit(across), normal[:, np.newaxis])).max(axis=1)
         middle = unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
         sine = np.linalg.norm(np.cross(middle, normal), axis=-1)
-        wall_error = (off[:, 1] - off[:, 0]) / np.maximum(np.abs(thickness), _LEAST_WALL_TOLD)
-        worst = np.maximum(worst, [_largest(distance), _largest(wall_error), _largest(sine)])
+        wall_error = np.abs(off[:, 1] - off[:, 0]) / np.maximum(np.abs(thickness), _LEAST_WALL_TOLD)
+        for index, values in enumerate((distance, wall_error, sine)):
+            worst[index] = grading.largest(values.ravel(), worst[index], fitted.points, np.abs(fitted.thickness) / 2)
         thinnest, thickest = grading.extremes(fitted, thinnest, thickest)
     angle = float(np.degrees(np.arcsin(min(worst[2], 1.0))))
     return Refit(n, float(worst[0]), float(worst[1]), angle, thinnest, thickest, len(samples))
@@ -230,7 +231,3 @@ def _require_shared_edges(wall: Wall, cell_size: float) -> None:
             f"the edges of neighbouring patches are {gaps[worst]:.2g} mm apart near ({place}) mm of the part: "
             "thickness, density, scale_field and map must be continuous, and the same at both ends that a map joins"
         )
-
-
-def _largest(values: Floats) -> float:
-    return float(np.max(np.abs(values)))

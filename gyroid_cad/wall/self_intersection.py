@@ -197,9 +197,9 @@ def _meeting(complex: CellComplex, grading: Grading, samples: Floats, middle: Fl
         found.append(met)
         found += [lookup.met(beyond, side * part * half[beyond])[0] for part in _ALONG_THE_WALL]
     worst = []
-    for met, factors in found:
-        wanted = grading.wanted(np.ones(len(met), dtype=bool), middle[met], reach[met])
-        where, factor = met[wanted], factors[wanted]
+    for places, factors in found:
+        wanted = grading.wanted(np.ones(len(places), dtype=bool), middle[places], reach[places])
+        where, factor = places[wanted], factors[wanted]
         if len(where):
             place = int(np.argmin(factor))
             at = divmod(int(where[place]), CLEARANCE_SAMPLES**2)

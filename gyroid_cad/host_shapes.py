@@ -15,19 +15,21 @@ if TYPE_CHECKING:
 __all__ = ["HostShapes"]
 
 
-class HasSolid(Protocol):
+class HasSolids(Protocol):
     def solid(self) -> KernelShape: ...
+
+    def named_solids(self) -> dict[str, KernelShape]: ...
 
 
 class HostShapes:
-    """Mixin for whatever has a ``solid``: the kernel's shape as the hosts' own types, which they ask for.
+    """Mixin for whatever has a ``solid`` and ``named_solids``: the kernel's shapes as the types that the hosts ask for.
 
     The hosts are optional, and take seconds to load: they are imported when they are asked for.
     """
 
     __slots__ = ()
 
-    def to_cadquery(self: HasSolid) -> cq.Shape:
+    def to_cadquery(self: HasSolids) -> cq.Shape:
         """Return the solid as a CadQuery shape, for ``cq.Assembly``, ``cq.Workplane``, exporters and viewers.
 
         Returns
@@ -54,13 +56,14 @@ class HostShapes:
 
         return Shape.cast(self.solid())
 
-    def to_build123d(self: HasSolid) -> bd.Part:
+    def to_build123d(self: HasSolids) -> bd.Part:
         """Return the solid as a build123d part, for algebra, builders, exporters and viewers.
 
         Returns
         -------
         build123d.Part
-            Of one solid or several; a shape of the caller's own, as of ``solid``.
+            Labelled by its domain, or with a child labelled so for each of several: the names stay in STEP. A shape of
+            the caller's own, as of ``solid``.
 
         Raises
         ------
@@ -78,5 +81,9 @@ class HostShapes:
         with host_import("build123d"):
             from build123d import Compound, Part, Shape
 
-        shape = Shape.cast(self.solid())
-        return Part(shape.wrapped if isinstance(shape, Compound) else [shape])
+        def part(name: str, solid: KernelShape) -> bd.Part:
+            shape = Shape.cast(solid)
+            return Part(shape.wrapped if isinstance(shape, Compound) else [shape], label=name)
+
+        parts = [part(name, solid) for name, solid in self.named_solids().items()]
+        return parts[0] if len(parts) == 1 else Part(children=parts)

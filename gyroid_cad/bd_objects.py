@@ -11,16 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, RotationLike
-from build123d.geometry import to_align_offset
-
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, SurfaceName, Trim
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.errors import ParameterError, host_import
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
 from gyroid_cad.surface.fit import FitSettings
+
+with host_import("build123d"):
+    from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, RotationLike
+    from build123d.geometry import to_align_offset
 
 __all__ = ["Gyroid", "GyroidFill"]
 

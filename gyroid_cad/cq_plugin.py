@@ -13,15 +13,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
-import cadquery as cq
-
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, SurfaceName, Trim
-from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.errors import GyroidError, ParameterError, host_import
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
 from gyroid_cad.surface.fit import FitSettings
+
+with host_import("cadquery"):
+    import cadquery as cq
 
 __all__ = ["GyroidWorkplane", "gyroid", "gyroid_fill"]
 

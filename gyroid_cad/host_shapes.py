@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from gyroid_cad.errors import host_import
+
 if TYPE_CHECKING:
     import build123d as bd
     import cadquery as cq
@@ -37,7 +39,7 @@ class HostShapes:
 
         Raises
         ------
-        ModuleNotFoundError
+        MissingHostError
             Without CadQuery: ``pip install "gyroid_cad[cadquery]"``.
 
         Examples
@@ -49,7 +51,8 @@ class HostShapes:
         >>> cq.Workplane(obj=lattice.to_cadquery()).faces().size()
         84
         """
-        from cadquery import Shape
+        with host_import("cadquery"):
+            from cadquery import Shape
 
         return Shape.cast(self.solid())
 
@@ -64,7 +67,7 @@ class HostShapes:
 
         Raises
         ------
-        ModuleNotFoundError
+        MissingHostError
             Without build123d: ``pip install "gyroid_cad[build123d]"``.
 
         Examples
@@ -75,7 +78,8 @@ class HostShapes:
         >>> len((part + bd.Pos(0, 0, 40) * bd.Box(10, 10, 10)).solids())
         2
         """
-        from build123d import Compound, Part, Shape
+        with host_import("build123d"):
+            from build123d import Compound, Part, Shape
 
         def part(name: str, solid: KernelShape) -> bd.Part:
             shape = Shape.cast(solid)

@@ -11,15 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, RotationLike
-from build123d.geometry import to_align_offset
-
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, SurfaceName, Trim
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.errors import ParameterError, host_import
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
 from gyroid_cad.surface.fit import FitSettings
+
+with host_import("build123d"):
+    from build123d import Align, BasePartObject, BuildPart, Location, Mode, Part, RotationLike
+    from build123d.geometry import to_align_offset
 
 __all__ = ["Gyroid", "GyroidFill"]
 
@@ -99,13 +101,16 @@ class GyroidFill(Part):  # type: ignore[misc]
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
         In a builder, the filled part takes the place of what is there.
-    **settings
-        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, material_density, tolerance, lattice, surface,
-        keep_islands.
+    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface
+        As of :func:`gyroid_cad.fill`.
 
     Attributes
     ----------
     report : FillReport
+    label : str
+        The domain: "sheet", "network-a", "network-b" or "surface".
+    children : tuple of Part
+        Where there are two domains: labelled "channel-a" and "channel-b".
 
     Raises
     ------
@@ -123,16 +128,42 @@ class GyroidFill(Part):  # type: ignore[misc]
         skin: float | None = None,
         openings: Sequence[Any] = (),
         mode: Mode = Mode.REPLACE,
-        **settings: Any,
+        origin: Point = (0.0, 0.0, 0.0),
+        rotation: Point = (0.0, 0.0, 0.0),
+        fit: FitSettings | None = None,
+        drop_islands: bool = False,
+        keep_islands: bool = False,
+        material_density: float | None = None,
+        tolerance: float | None = None,
+        lattice: Lattice | None = None,
+        surface: SurfaceName = "gyroid",
     ) -> None:
         # As the host's operations do, not as its objects: those are placed at the builder's locations.
         context: BuildPart | None = BuildPart._get_context("GyroidFill")
         subject = part if part is not None or context is None else context.part
         if subject is None:
             raise ParameterError("part", part, "a part, or a builder with one in it")
-        filled = fill(subject, cell_size, thickness, density, kind, skin=skin, openings=openings, **settings)
+        filled = fill(
+            subject,
+            cell_size,
+            thickness,
+            density,
+            kind,
+            origin,
+            rotation,
+            fit,
+            drop_islands,
+            material_density,
+            skin=skin,
+            openings=openings,
+            tolerance=tolerance,
+            lattice=lattice,
+            surface=surface,
+            keep_islands=keep_islands,
+        )
         self.report = filled.report
         self.mode = mode
-        super().__init__(obj=filled.to_build123d().wrapped)
+        part = filled.to_build123d()
+        super().__init__(obj=part.wrapped, label=part.label, children=part.children)
         if context is not None:
             context._add_to_context(self, clean=False, mode=mode)

@@ -10,16 +10,19 @@ Type checkers know neither: for them there are :class:`GyroidWorkplane`, and the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
-import cadquery as cq
-
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, SurfaceName, Trim
-from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.errors import GyroidError, ParameterError, host_import
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.lattice import Lattice, MapLike
 from gyroid_cad.surface.fit import FitSettings
+
+with host_import("cadquery"):
+    import cadquery as cq
 
 __all__ = ["GyroidWorkplane", "gyroid", "gyroid_fill"]
 
@@ -98,7 +101,15 @@ def gyroid_fill(
     kind: Kind = "sheet",
     *,
     skin: float | None = None,
-    **settings: Any,
+    openings: Sequence[Any] = (),
+    origin: Point = (0.0, 0.0, 0.0),
+    rotation: Point = (0.0, 0.0, 0.0),
+    fit: FitSettings | None = None,
+    drop_islands: bool = False,
+    keep_islands: bool = False,
+    tolerance: float | None = None,
+    lattice: Lattice | None = None,
+    surface: SurfaceName = "gyroid",
 ) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
@@ -107,29 +118,44 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin
-        As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates.
-    **settings
-        Of :func:`gyroid_cad.fill`: origin, rotation, fit, drop_islands, openings, tolerance, lattice, surface,
-        keep_islands.
+    cell_size, thickness, density, kind, skin, openings, origin, rotation, fit, drop_islands, keep_islands, tolerance, \
+    lattice, surface
+        As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
     -------
     Workplane
         With one object: the solid, or a compound where there are several; the bare surface is a compound of shells.
+        Its domains are tagged by their names: ``filled.solids(tag="channel-a")``.
 
     Raises
     ------
     ParameterError, SelfIntersectionError, FitError, KernelError
     """
     selected = [shape for shape in self.objects if isinstance(shape, cq.Face)]
-    if selected:
-        settings["openings"] = [*settings.get("openings", ()), *selected]
     try:
         part = self.findSolid()
     except ValueError:
         raise ParameterError("part", self, "a chain with a solid in it") from None
-    made = fill(part, cell_size, thickness, density, kind, skin=skin, **settings)
+    made = fill(
+        part,
+        cell_size,
+        thickness,
+        density,
+        kind,
+        origin,
+        rotation,
+        fit,
+        drop_islands,
+        skin=skin,
+        openings=[*openings, *selected],
+        tolerance=tolerance,
+        lattice=lattice,
+        surface=surface,
+        keep_islands=keep_islands,
+    )
+    for name, domain in made.domains.items():
+        self.newObject([cq.Shape.cast(domain)]).tag(name)
     filled: Plane = self.newObject([made.to_cadquery()])
     return filled
 

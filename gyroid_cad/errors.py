@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from gyroid_cad.former import Moved, former_name
@@ -12,8 +14,10 @@ __all__ = [
     "GyroidError",
     "IslandsWarning",
     "KernelError",
+    "MissingHostError",
     "ParameterError",
     "SelfIntersectionError",
+    "host_import",
 ]
 
 _MOVED = {"SoundnessError": Moved(f"{__name__}.SelfIntersectionError")}
@@ -120,6 +124,56 @@ class KernelError(GyroidError, RuntimeError):
 
 class ExportError(GyroidError, OSError):
     """A file that could not be written; nothing was left behind and nothing older was touched."""
+
+
+class MissingHostError(GyroidError, ModuleNotFoundError):
+    """A CAD host, CadQuery or build123d, that is asked for and not installed.
+
+    Parameters
+    ----------
+    name : {"cadquery", "build123d"}
+        Of the package, and of our extra that brings it.
+
+    Attributes
+    ----------
+    remedy : str
+        The command that installs it, alone or beside the other.
+    """
+
+    def __init__(self, name: str) -> None:
+        # The extra of one host may replace the kernel under the other; that of both finds versions that share one.
+        self.remedy = f'pip install "gyroid_cad[{name}]", or "gyroid_cad[hosts]" for both hosts in one environment'
+        super().__init__(f"{name} is not installed: {self.remedy}")
+        self.name = name
+
+    def __reduce__(self) -> tuple[type[MissingHostError], tuple[str | None]]:
+        return type(self), (self.name,)
+
+
+@contextmanager
+def host_import(name: str) -> Iterator[None]:
+    """Context of an import from a host: where the host is not installed, the extra that brings it is named.
+
+    Parameters
+    ----------
+    name : {"cadquery", "build123d"}
+
+    Raises
+    ------
+    MissingHostError
+
+    Examples
+    --------
+    >>> with host_import("cadquery"):
+    ...     from cadquery import Shape
+    """
+    try:
+        yield
+    except ModuleNotFoundError as problem:
+        # Another package that the host lacks, or a module that it no longer has, is for the host to explain.
+        if problem.name != name:
+            raise
+        raise MissingHostError(name) from None
 
 
 class IslandsWarning(UserWarning):

@@ -139,6 +139,10 @@ class Lattice(LatticeParameters, HostShapes):
         """
         return self.built(progress).solid()
 
+    def named_solids(self) -> dict[str, KernelShape]:
+        """The solid under the name of its surface, as hosts show it."""
+        return {self.surface: self.solid()}
+
     def report(self, progress: Progress | None = None) -> LatticeReport:
         """Build the solid if it isn't yet, have the kernel check it too, and say what it is."""
         built = self.built(progress)

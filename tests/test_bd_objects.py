@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from pathlib import Path
 from typing import Any
 
 import build123d as bd
@@ -241,3 +242,19 @@ def test_chips_at_the_corners_of_whole_cells_are_dropped_unless_they_are_to_be_k
     filled = GyroidFill(box, 10, 0.8, fit=GYROID["fit"], keep_islands=keep)
     assert len(Gyroid(**GYROID, trim="box", keep_islands=keep).solids()) == len(filled.solids()) == solids
     assert filled.report.islands + filled.report.dropped == 2
+
+
+def test_each_domain_of_a_filled_part_is_a_child_and_keeps_its_name_in_a_file(
+    tmp_path: Path,
+) -> None:
+    fluids = bd.Pos(50, 0, 0) * GyroidFill(bd.Box(6, 5, 4), 10, 0.8, kind="channels")
+    assert [child.label for child in fluids.children] == ["channel-a", "channel-b"]
+    assert sum(child.volume for child in fluids.children) == pytest.approx(fluids.volume)
+    assert bd.export_step(fluids, tmp_path / "fluids.step")
+    back = bd.import_step(tmp_path / "fluids.step")
+    assert {"channel-a", "channel-b"} <= {shape.label for shape in back.descendants}
+    np.testing.assert_allclose(back.bounding_box().center().X, 50, atol=0.5)
+
+
+def test_one_domain_is_the_label_of_the_part_itself() -> None:
+    assert GyroidFill(bd.Box(6, 5, 4), 10, 0.8).label == "sheet"

@@ -299,3 +299,10 @@ def test_the_typed_workplane_is_cadquerys_with_the_same_methods() -> None:
     plain = cq.Workplane().box(12, 9, 8).gyroid_fill(cell_size=8, density=0.3)
     assert made.val().Volume() == pytest.approx(plain.val().Volume())
     assert not isinstance(plain, GyroidWorkplane)
+
+
+def test_each_domain_of_a_filled_part_is_tagged_by_its_name() -> None:
+    fluids = cq.Workplane().box(6, 5, 4).gyroid_fill(10, 0.8, kind="channels")
+    a, b = (fluids.solids(tag=name).val().Volume() for name in ("channel-a", "channel-b"))
+    assert min(a, b) > 0
+    assert a + b == pytest.approx(fluids.val().Volume())

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 import runpy
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from documented import ROOT, Block, blocks_of, missing, run_shell
+from remembered import filled_once
 
 from gyroid_cad.filling import fill as filling
 from gyroid_cad.kernel.check import is_valid
@@ -73,35 +71,6 @@ def readme_blocks(file: str | None) -> list[Block]:
     found = [block for block in blocks_of(README) if file and block.language == "sh" and file in block.text]
     assert found or file is None
     return found
-
-
-def filled_once(fill: Callable[..., Any]) -> Callable[..., Any]:
-    """Fill a part, or give what a part of that size was filled with before, by the very same settings."""
-    known: dict[Any, Any] = {}
-    signature = inspect.signature(fill)
-
-    def remembered(*given: Any, **named: Any) -> Any:
-        bound = signature.bind(*given, **named)
-        bound.apply_defaults()
-        settings = {name: plain(value) for name, value in bound.arguments.items() if name not in ("part", "progress")}
-        part = filling.part_of(bound.arguments["part"])
-        size = *part.low.round(6).tolist(), *part.high.round(6).tolist(), round(part.volume, 6)
-        key = size, tuple(settings.items())
-        if key not in known:
-            known[key] = fill(*given, **named)
-        return known[key]
-
-    return remembered
-
-
-def plain(value: Any) -> Any:
-    """One spelling of a setting, whichever door it came through."""
-    if isinstance(value, list | tuple):
-        return tuple(map(plain, value))
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return value
 
 
 def test_the_bracket_s_file_is_what_the_example_draws() -> None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
+import re
 import sys
+import tomllib
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from gyroid_cad.errors import MissingHostError, host_import
 from gyroid_cad.filling.fill import Filled, fill
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.extent import bounding_box
@@ -104,8 +109,26 @@ def test_the_bare_surface_is_a_compound_of_shells_in_both(bd: Any) -> None:
     assert shape.Area() == pytest.approx(part.area)
 
 
-def test_without_its_host_a_shape_says_which_package_is_missing(cell: Lattice, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, method in (("cadquery", cell.to_cadquery), ("build123d", cell.to_build123d)):
-        monkeypatch.setitem(sys.modules, name, None)
-        with pytest.raises(ModuleNotFoundError, match=name):
-            method()
+DOORS = {"cadquery": ("to_cadquery", "cq_plugin"), "build123d": ("to_build123d", "bd_objects")}
+EXTRAS = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+
+
+@pytest.mark.parametrize("name", DOORS)
+def test_without_its_host_a_door_says_which_extra_brings_it(
+    name: str, cell: Lattice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    method, module = DOORS[name]
+    monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.delitem(sys.modules, f"gyroid_cad.{module}", raising=False)
+    for door in (getattr(cell, method), lambda: import_module(f"gyroid_cad.{module}")):
+        with pytest.raises(MissingHostError) as raised:
+            door()
+        assert str(raised.value).startswith(f'{name} is not installed: pip install "gyroid_cad[{name}]", or ')
+        assert str(pickle.loads(pickle.dumps(raised.value))) == str(raised.value)
+    assert set(re.findall(r"gyroid_cad\[(\w+)\]", str(raised.value))) == {name, "hosts"} <= set(EXTRAS)
+
+
+def test_what_a_host_itself_lacks_is_for_the_host_to_say() -> None:
+    with pytest.raises(ModuleNotFoundError, match="nlopt") as raised, host_import("cadquery"):
+        raise ModuleNotFoundError("No module named 'nlopt'", name="nlopt")
+    assert not isinstance(raised.value, MissingHostError)

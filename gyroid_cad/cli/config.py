@@ -11,6 +11,7 @@ from typing import Any
 
 import tomli_w
 
+from gyroid_cad.common.doors import key_of
 from gyroid_cad.common.inputs import key_line, read_toml
 from gyroid_cad.errors import ParameterError
 
@@ -84,7 +85,7 @@ def read_config(path: str, known: Iterable[str], flags: Iterable[str] = ()) -> C
     values = _without_table(tables, known, path, text)
     for key, value in values.items():
         if key not in known:
-            near = difflib.get_close_matches(key.replace("-", "_").lower(), known, n=1, cutoff=0.5)
+            near = [key_of(key)] if key_of(key) in known else difflib.get_close_matches(_spelt(key), known, 1, 0.5)
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
             raise ParameterError(_place(path, text, key), value, f"a known key; {hint}")
         if key in flags:
@@ -98,6 +99,10 @@ def read_config(path: str, known: Iterable[str], flags: Iterable[str] = ()) -> C
         key: [str(part) for part in value] if isinstance(value, list) else str(value) for key, value in values.items()
     }
     return Config(path, as_text, text)
+
+
+def _spelt(key: str) -> str:
+    return key.replace("-", "_").lower()
 
 
 def _without_table(tables: dict[str, Any], known: Sequence[str], path: str, text: str) -> dict[str, Any]:

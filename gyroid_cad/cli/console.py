@@ -44,7 +44,7 @@ def print_check_table(check: PrintCheck) -> None:
 def print_doctor(diagnosis: Diagnosis) -> None:
     """Print what is installed and what the self-test found."""
     rows = [(finding.subject, finding.state, finding.detail) for finding in diagnosis.findings]
-    verdict = "all that is required is there and works" if diagnosis.ok else "something required fails"
+    verdict = "all that is required is there and works" if diagnosis.ok else "something is missing or fails"
     print_table(None, [*rows, ("verdict", "ok" if diagnosis.ok else "failed", verdict)])
 
 

@@ -19,7 +19,8 @@ __all__ = ["doctor_command"]
 def doctor_command(context: click.Context, as_json: bool) -> None:
     """Say what is installed, and build, write and read one cell to see whether it works.
 
-    The status is 1 if something that is required is missing or fails.
+    A host that is installed takes the cell as a shape of its own. The status is 1 if something that is required is
+    missing, or something that is installed fails.
 
     \b
     gyroid-cad doctor

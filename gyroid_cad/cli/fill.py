@@ -90,8 +90,6 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; "
     "may be repeated.",
 )
-@click.option("--origin", nargs=3, type=float, default=(0, 0, 0), metavar="X Y Z", help="Of the lattice, in mm.")
-@click.option("--rotation", nargs=3, type=float, default=(0, 0, 0), metavar="A B C", help="About x, y, z, in degrees.")
 @click.option(
     "--drop-islands",
     is_flag=True,

@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from gyroid_cad.errors import MissingHostError
 from gyroid_cad.version import __version__
 
 __all__ = ["OPTIONAL", "PROGRAMS", "REQUIRED", "Diagnosis", "Finding", "diagnose", "kernel_version"]
@@ -36,10 +37,24 @@ OPTIONAL = {
     "matplotlib": "draws histograms: mesh --histogram",
     "mapdl-archive": "writes ANSYS .cdb files",
 }
+# How those are installed that are an extra of ours.
+_REMEDIES = {
+    "cadquery": MissingHostError("cadquery").remedy,
+    "build123d": MissingHostError("build123d").remedy,
+    "mapdl-archive": 'pip install "gyroid_cad[ansys]"',
+}
 PROGRAMS = {"ccx": "CalculiX: solves the .inp files that mesh writes"}
 # The kernel's Python wheels: with and without VTK.
 _KERNELS = ("cadquery-ocp", "cadquery-ocp-novtk")
-_SUBJECTS = ("kernel loads", "one cell is built", "STEP is written and read", "STL is written and closed")
+# What is tested, and the package that it is about where that is one of those that need not be there.
+_SUBJECTS = {
+    "kernel loads": None,
+    "one cell is built": None,
+    "STEP is written and read": None,
+    "STL is written and closed": None,
+    "CadQuery takes the cell": "cadquery",
+    "build123d takes the cell": "build123d",
+}
 GOOD, MISSING, FAILED = "good", "missing", "failed"
 
 
@@ -105,10 +120,12 @@ def diagnose() -> Diagnosis:
     findings = [
         Finding("gyroid_cad", GOOD, __version__, True),
         Finding("Python", GOOD, f"{platform.python_version()}, {system}, {sys.executable}", True),
-        Finding("kernel", GOOD if any(map(_version, _KERNELS)) else MISSING, kernel_version(), True),
+        _kernel(),
     ]
-    findings += [_package(name, True, "required: pip install gyroid_cad again") for name in REQUIRED]
-    findings += [_package(name, False, purpose) for name, purpose in OPTIONAL.items()]
+    findings += [_package(name, True, "required", "pip install gyroid_cad again") for name in REQUIRED]
+    findings += [
+        _package(name, False, purpose, _REMEDIES.get(name, f"pip install {name}")) for name, purpose in OPTIONAL.items()
+    ]
     findings += [_program(name, purpose) for name, purpose in PROGRAMS.items()]
     return Diagnosis((*findings, *_self_test()))
 
@@ -120,10 +137,21 @@ def _version(distribution: str) -> str | None:
         return None
 
 
-def _package(name: str, required: bool, purpose: str) -> Finding:
+def _kernel() -> Finding:
+    """The kernel's wheels, which share one folder: of two versions, one lies over the other and neither works."""
+    found = {name: told for name in _KERNELS if (told := _version(name)) is not None}
+    if len(set(found.values())) > 1:
+        both = " and ".join(f"{name} {told}" for name, told in found.items())
+        remedy = "install into a new environment, with the host's extra: gyroid_cad[cadquery], [build123d] or [hosts]"
+        return Finding("kernel", FAILED, f"{both}, one laid over the other: {remedy}", True)
+    return Finding("kernel", GOOD if found else MISSING, kernel_version(), True)
+
+
+def _package(name: str, required: bool, purpose: str, remedy: str) -> Finding:
     found = _version(name)
-    detail = purpose if found is None else found if required else f"{found}: {purpose}"
-    return Finding(name, MISSING if found is None else GOOD, detail, required)
+    if found is None:
+        return Finding(name, MISSING, f"{purpose}: {remedy}", required)
+    return Finding(name, GOOD, found if required else f"{found}: {purpose}", required)
 
 
 def _program(name: str, purpose: str) -> Finding:
@@ -132,9 +160,11 @@ def _program(name: str, purpose: str) -> Finding:
 
 
 def _self_test() -> Iterator[Finding]:
-    """One cell: built; written as STEP and read; written as STL and read. What fails takes the rest with it."""
+    """One cell: built, written as STEP and STL and read, taken by the hosts that are installed."""
     with TemporaryDirectory() as folder:
-        for subject in _SUBJECTS:
+        for subject, package in _SUBJECTS.items():
+            if package is not None and _version(package) is None:
+                continue
             start = time.perf_counter()
             try:
                 # Whatever is not installed fails here as well.

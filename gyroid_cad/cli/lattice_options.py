@@ -36,8 +36,8 @@ __all__ = [
 
 _WALL_OPTIONS = ("thickness", "density", "porosity")
 _OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map")
-# Of a block of cells that is built, not of one that fills a part.
-_CUT_OPTIONS = ("trim", "keep_islands")
+# Of a block of cells that is built. One that fills a part is placed and cut by the filling.
+_CUT_OPTIONS, _PLACE_OPTIONS = ("trim", "keep_islands"), ("origin", "rotation")
 PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
@@ -166,6 +166,22 @@ _INFILL_OPTIONS = (
         show_default=True,
         help="The paper's own leaves gaps between patches, and is refused with their size.",
     ),
+    click.option(
+        "--origin",
+        nargs=3,
+        type=float,
+        default=(0, 0, 0),
+        metavar="X Y Z",
+        help="Where the lattice's own origin is placed, in mm; fields and maps go with it.",
+    ),
+    click.option(
+        "--rotation",
+        nargs=3,
+        type=float,
+        default=(0, 0, 0),
+        metavar="A B C",
+        help="Turns of the lattice about x, y and z, one after the other, in degrees.",
+    ),
 )
 _OPTIONS = (
     click.option("--cells", nargs=3, type=int, metavar="NX NY NZ", help="Cubic cells along x, y and z."),
@@ -243,7 +259,9 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         raise click.UsageError(f"Got unexpected extra argument '{config}'; a lattice in a file ends in .toml.")
     fit = fit_of(given)
     require_given(given, "cells")
-    cut = {name: given[name] for name in _CUT_OPTIONS if "trim" in given}
+    built = "trim" in given
+    cut = {name: given[name] for name in _CUT_OPTIONS if built}
+    place = {name: given[name] for name in _PLACE_OPTIONS if built}
     if any(given[name] is not None for name in PAPER_OPTIONS):
         own_options = (*_OWN_OPTIONS, *cut)
         mixed = [name for name in own_options if given[name] not in (None, False)]
@@ -253,11 +271,12 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
                 f"{listed(mixed or own_options)}"
             )
         units = {name: given[name] for name in PAPER_OPTIONS if given[name] is not None}
-        return Lattice.paper(given["cells"], **units, fit=fit, tolerance=given["tolerance"], surface=given["surface"])
+        common = {name: given[name] for name in ("tolerance", "surface")}
+        return Lattice.paper(given["cells"], **units, fit=fit, **common, **place)
     require_given(given, "cell_size")
     require_one_wall(given)
     own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface")}
-    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, **cut, fit=fit)
+    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, **cut, **place, fit=fit)
 
 
 def require_one_wall(given: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gyroid_cad.common.doors import key_of
 from gyroid_cad.errors import GyroidError, ParameterError
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ __all__ = [
 # The last as shells say it of a program that wrote into a closed pipe.
 FAILED, BAD_USAGE, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 _CONFIG = "gyroid_cad.config"
-# Parameters of Python that a command calls otherwise, for it takes one after the other.
-_OPTION_OF = {"openings": "opening"}
 # What a parameter may have been reckoned from.
 _GIVEN_AS = {"density": "porosity"}
 _MEMORY = "memory gave out: it takes fewer cells, coarser triangles, or more memory for this process"
@@ -103,7 +102,7 @@ def label(context: click.Context | None, parameter: str) -> str:
         As the options call it in Python.
     """
     known = {} if context is None else {option.name: option for option in context.command.params}
-    option = known.get(_OPTION_OF.get(parameter, parameter))
+    option = known.get(parameter) or known.get(key_of(parameter))
     if context is None or option is None or option.name is None:
         return parameter
     parameter = option.name

@@ -1,4 +1,4 @@
-"""Self-test of an installation: one cell, built; written as STEP and read; written as STL and read."""
+"""Self-test of an installation: one cell, built; written as STEP and STL and read; taken by the hosts."""
 
 from __future__ import annotations
 
@@ -61,6 +61,16 @@ def _stl_is_closed(folder: Path) -> str:
     return f"{found.triangles:,} triangles, closed, volume off by {error:+.1e}"
 
 
+def _cadquery_takes_it(folder: Path) -> str:
+    shape = _lattice().to_cadquery()
+    return f"{shape.ShapeType()} of {len(shape.Faces())} faces"
+
+
+def _build123d_takes_it(folder: Path) -> str:
+    part = _lattice().to_build123d()
+    return f"{type(part).__name__} of {len(part.faces())} faces"
+
+
 def _require(contains: bool, problem: str) -> None:
     if not contains:
         raise RuntimeError(problem)
@@ -72,4 +82,6 @@ TESTS = {
     "one cell is built": _cell_is_built,
     "STEP is written and read": _step_returns,
     "STL is written and closed": _stl_is_closed,
+    "CadQuery takes the cell": _cadquery_takes_it,
+    "build123d takes the cell": _build123d_takes_it,
 }

@@ -67,6 +67,8 @@ def view(
         Of names that will not do, and of triangles that cannot be read.
     GyroidError
         If there is no display for a window.
+    MissingHostError
+        If there is no CadQuery for a window.
     ExportError
         If a file cannot be read, or the picture not be written.
     """
@@ -76,12 +78,12 @@ def view(
         _require_viewed(what)
     if picture is None:
         _require_display()
+        # It loads CadQuery, and is refused before any work where that is missing.
+        from gyroid_cad.cli.window import show_window
     shown = _of_lattice(what, progress) if isinstance(what, Lattice) else _of_file(Path(what))
     if not any(len(facets.corners) for facets in shown):
         raise GyroidError(f"{what} holds no face to be seen")
     if picture is None:
-        from gyroid_cad.cli.window import show_window
-
         show_window(shown, f"{what.surface} lattice" if isinstance(what, Lattice) else Path(what).name, _SIZE)
         return
     image = png(draw(shown, _SIZE))

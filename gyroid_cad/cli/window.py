@@ -9,7 +9,6 @@ import numpy as np
 
 # What is made before this is there to draw it is never drawn.
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
-from cadquery import vis
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkPoints
@@ -18,7 +17,11 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkStaticCleanPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkAssembly, vtkPolyDataMapper
 
+from gyroid_cad.errors import host_import
 from gyroid_cad.render.facets import Facets
+
+with host_import("cadquery"):
+    from cadquery import vis
 
 __all__ = ["show_window"]
 

@@ -149,6 +149,10 @@ class Filled(HostShapes):
         shapes = list(self.domains.values())
         return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
 
+    def named_solids(self) -> dict[str, KernelShape]:
+        """Shapes by the names of their domains, each under a handle of the caller's own."""
+        return {name: another_handle(shape) for name, shape in self.domains.items()}
+
     def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The filled part drawn, as a PNG file, as :meth:`gyroid_cad.Lattice.picture` draws a lattice.
 

@@ -140,3 +140,9 @@ def test_a_flag_is_true_or_false_and_nothing_else(tmp_path: Path) -> None:
 
 def test_flags_are_printed_only_where_they_are_set() -> None:
     assert printed_config({"instances": True, "full": False}) == "instances = true\n"
+
+
+def test_a_parameter_of_python_is_known_by_its_key(tmp_path: Path) -> None:
+    (tmp_path / "fill.toml").write_text('paths = ["a.step"]')
+    with pytest.raises(ParameterError, match="did you mean output"):
+        read_config(str(tmp_path / "fill.toml"), ["output", "part", "cells"])

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import sys
 import tomllib
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from gyroid_cad.cli import installation as doctor
 from gyroid_cad.cli import self_test
 from gyroid_cad.cli.app import main
 from gyroid_cad.cli.installation import OPTIONAL, REQUIRED, Diagnosis, diagnose, kernel_version
+from gyroid_cad.errors import MissingHostError
 
 Captured = pytest.CaptureFixture[str]
 
@@ -80,6 +83,44 @@ def test_a_missing_package_that_is_required_is_a_failure_and_another_is_none(mon
         monkeypatch.setattr(doctor, "_version", without(name))
         diagnosis = diagnose()
         assert (diagnosis.ok, states(diagnosis)[name]) == (well, "missing")
+
+
+HOSTS = {"cadquery": "CadQuery takes the cell", "build123d": "build123d takes the cell"}
+
+
+def test_a_host_that_is_installed_takes_a_cell_and_another_is_told_how_to_come(healthy: Diagnosis) -> None:
+    found = {finding.subject: finding for finding in healthy.findings}
+    for name, subject in HOSTS.items():
+        if find_spec(name):
+            assert found[subject].state == found[name].state == "good"
+            assert found[subject].detail.endswith("of 84 faces")
+        else:
+            assert subject not in found
+            assert found[name].state == "missing"
+            assert found[name].detail.endswith(MissingHostError(name).remedy)
+
+
+def test_a_host_that_is_installed_and_does_not_load_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As CadQuery 2.8 does where something has brought the kernel's next version.
+    real: Callable[[str], str | None] = doctor._version
+    monkeypatch.setattr(doctor, "_version", lambda name: "2.8.0" if name == "cadquery" else real(name))
+    monkeypatch.setitem(sys.modules, "cadquery", None)
+    diagnosis = diagnose()
+    assert not diagnosis.ok
+    assert [finding.subject for finding in diagnosis.findings if finding.state == "failed"] == [HOSTS["cadquery"]]
+
+
+def test_wheels_of_two_kernels_laid_over_one_another_are_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As pip lays them where our plain package is added to build123d 0.12.
+    wheels = {"cadquery-ocp": "8.0.1.1.0", "cadquery-ocp-novtk": "7.9.3.1.1"}
+    monkeypatch.setattr(doctor, "_self_test", lambda: iter(()))
+    monkeypatch.setattr(doctor, "_version", lambda name: wheels.get(name, "1"))
+    (kernel,) = [finding for finding in diagnose().findings if finding.subject == "kernel"]
+    assert kernel.state == "failed"
+    assert all(f"{name} {told}" in kernel.detail for name, told in wheels.items())
+    assert not diagnose().ok
+    wheels["cadquery-ocp-novtk"] = wheels["cadquery-ocp"]
+    assert diagnose().ok
 
 
 def test_programs_are_looked_for_and_not_required(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from PIL import Image
 from gyroid_cad.cli import view as viewer
 from gyroid_cad.cli.app import main
 from gyroid_cad.cli.view import view
-from gyroid_cad.errors import GyroidError, ParameterError
+from gyroid_cad.errors import GyroidError, MissingHostError, ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
 
@@ -155,6 +155,18 @@ def test_without_a_display_a_window_is_refused_in_one_line_that_says_what_to_do(
     assert run.stderr.splitlines() == [
         f"gyroid-cad: error: no display to open a window on: {words}; -o FILE.png draws without one"
     ]
+
+
+def test_without_cadquery_a_window_is_refused_before_any_work(
+    lattice: Lattice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(viewer, "has_display", lambda: True)
+    monkeypatch.setitem(sys.modules, "cadquery", None)
+    monkeypatch.delitem(sys.modules, "gyroid_cad.cli.window", raising=False)
+    stages: list[str] = []
+    with pytest.raises(MissingHostError, match=r'pip install "gyroid_cad\[cadquery\]"'):
+        view(lattice, progress=lambda stage, done, total: stages.append(stage))
+    assert stages == []
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-import cadquery as cq
+import build123d as bd
 import pytest
 
 from gyroid_cad.errors import ExportError
@@ -25,10 +25,11 @@ HEADER = (
 
 @pytest.fixture(scope="module")
 def peg(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    part = cq.Workplane().box(6, 5, 7).edges("|Z").fillet(1).faces(">Z").workplane().hole(1.5)
+    box = bd.Box(6, 5, 7)
+    part = bd.fillet(box.edges().filter_by(bd.Axis.Z), 1) - bd.Cylinder(0.75, 7)
     path = tmp_path_factory.mktemp("peg") / "peg.step"
-    write_step(part.val().wrapped, path)
-    write_brep(part.val().wrapped, path.with_suffix(".brep"))
+    write_step(part.solid().wrapped, path)
+    write_brep(part.solid().wrapped, path.with_suffix(".brep"))
     return path
 
 

@@ -330,7 +330,7 @@ def _described(
     wanted = regions_of(kind, size, thickness, density, surface.tube)
 
     def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
-        made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
+        made = endless_infill(part, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
             name, given = ("thickness", thickness) if density is None else ("density", density)

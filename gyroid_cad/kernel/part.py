@@ -19,11 +19,12 @@ from OCP.GeomAbs import GeomAbs_Plane
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
-from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID, TopAbs_VERTEX
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
+from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
@@ -78,7 +79,7 @@ class Part:
                 inside[index] = classifier.State() == TopAbs_IN
         return inside
 
-    def surface_samples(self, spacing: float) -> tuple[Floats, float]:
+    def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
 
         Parameters
@@ -89,13 +90,16 @@ class Part:
         Returns
         -------
         points : ndarray, shape (n, 3)
+        normals : ndarray, shape (n, 3)
+            Of triangles that they lie on, out of the part.
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
         copy = BRepBuilderAPI_Copy(self.shape, False, False).Shape()
         BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
         clouds = [_spread(*triangles, spacing) for triangles in _triangles(copy)]
-        return np.concatenate(clouds), spacing + deflection
+        points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
+        return points, normals, spacing + deflection
 
 
 def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
@@ -182,7 +186,7 @@ def measure(shape: TopoDS_Shape) -> tuple[float, float]:
 
 
 def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Corners of the triangles of each meshed face: three arrays of shape (triangles, 3)."""
+    """Corners of the triangles of each meshed face, anticlockwise from outside: three arrays (triangles, 3)."""
     for part in parts_of(shape, TopAbs_FACE):
         location = TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(as_face(part), location)
@@ -192,13 +196,16 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
         points = (mesh.Node(index).Transformed(move) for index in range(1, mesh.NbNodes() + 1))
         nodes = np.array([(point.X(), point.Y(), point.Z()) for point in points])
         corners = np.array([mesh.Triangle(index).Get() for index in range(1, mesh.NbTriangles() + 1)]) - 1
+        if part.Orientation() == TopAbs_REVERSED:
+            corners = corners[:, ::-1]
         yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
 
 
-def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> Floats:
-    """Points of triangles, their corners among them, so that no place is further than the spacing from one."""
+def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
+    """Points of triangles, their corners among them, so that no place is further than the spacing from one; normals."""
+    normals = unit(np.cross(b - a, c - a))
     steps = [np.ceil(np.linalg.norm(end - a, axis=1) / spacing).astype(int).clip(1) for end in (b, c)]
-    clouds = []
+    clouds, directions = [], []
     for along_b, along_c in np.unique(np.stack(steps, axis=1), axis=0).tolist():
         alike = (steps[0] == along_b) & (steps[1] == along_c)
         u, v = (np.linspace(0, 1, count + 1) for count in (along_b, along_c))
@@ -206,8 +213,11 @@ def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> Floats:
         # Beyond the third side points are moved onto it: a place near it is then no further from one.
         excess = np.maximum(u + v, 1)
         u, v = (u / excess)[:, np.newaxis, np.newaxis], (v / excess)[:, np.newaxis, np.newaxis]
-        clouds.append((a[alike] + u * (b - a)[alike] + v * (c - a)[alike]).reshape(-1, 3))
-    return np.unique(np.concatenate(clouds), axis=0)
+        cloud = a[alike] + u * (b - a)[alike] + v * (c - a)[alike]
+        clouds.append(cloud.reshape(-1, 3))
+        directions.append(np.broadcast_to(normals[alike], cloud.shape).reshape(-1, 3))
+    points, first = np.unique(np.concatenate(clouds), axis=0, return_index=True)
+    return points, np.concatenate(directions)[first]
 
 
 _ACCEPTED = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'

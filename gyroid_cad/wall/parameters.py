@@ -23,6 +23,7 @@ from gyroid_cad.surface.families import MinimalSurface, TubeLaw, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.covering import block_extent
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
 from gyroid_cad.wall.fitted import HOME, LatticeSpec
 from gyroid_cad.wall.grading import THINNEST_WALL, Grading
@@ -312,6 +313,8 @@ class LatticeParameters:
             self.scale_field,  # type: ignore[arg-type]
             space,
             self.minimal_surface,
+            # Patches reach out of a block that is cut from them: there nothing is asked of the wall.
+            None if self.trim is None else block_extent(self.cells, self.cell_size),
         )
 
     def _measures(self) -> ExactMeasures:

@@ -74,7 +74,7 @@ def never(point: Floats) -> bool:
 def lattice_in(part: Part) -> tuple[Faces, Faces]:
     """The lattice's faces that the part's boundary may cross, and those wholly inside."""
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
-    cloud, error = part.surface_samples(L / 12)
+    cloud, _, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
     samples = np.linspace(-1, 1, SIDE_SAMPLES)
     points = FRAME.placed(patch_points_and_normals(complex, L, samples)[0])

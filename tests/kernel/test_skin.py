@@ -111,7 +111,7 @@ def filled(name: str) -> tuple[Part, Hollow, TopoDS_Shape, TopoDS_Shape]:
     part, made = parted(*{"ball": (ball(),), "box": (box(), SKIN, [">Z"])}[name])
     core = made.core
     complex = covering_complex(core.low, core.high, FRAME, CELL, WALL / 2)
-    cloud, error = core.surface_samples(CELL / 12)
+    cloud, _, error = core.surface_samples(CELL / 12)
     tree = cKDTree(cloud)
     samples = np.linspace(-1, 1, SIDE_SAMPLES)
     points = FRAME.placed(patch_points_and_normals(complex, CELL, samples)[0])

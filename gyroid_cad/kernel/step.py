@@ -50,9 +50,9 @@ def compact_step(source: Path, target: Path) -> None:
     target : Path
         Another file.
     """
-    shared = _shared_points(source)
+    points = _Points(source)
     with source.open(encoding="utf-8") as lines, target.open("w", encoding="utf-8", newline="\n") as out:
-        out.writelines(_rewritten(entity, shared) for entity in _entities(lines))
+        out.writelines(_rewritten(entity, points) for entity in _entities(lines))
 
 
 def _entities(lines: TextIO) -> Iterator[str]:
@@ -66,28 +66,45 @@ def _entities(lines: TextIO) -> Iterator[str]:
     yield pending
 
 
-def _shared_points(source: Path) -> dict[str, str]:
-    """For each pole that repeats an earlier point, the earlier one's id."""
-    first: dict[str, str] = {}
-    shared: dict[str, str] = {}
-    used_elsewhere: set[str] = set()
-    with source.open(encoding="utf-8") as lines:
-        for entity in _entities(lines):
-            if point := _POINT.match(entity):
-                original = first.setdefault(_rounded(point[2]), point[1])
-                if original != point[1]:
-                    shared[point[1]] = original
-            elif _SPLINE not in entity:
-                used_elsewhere.update(_REFERENCE.findall(entity))
-    return {number: original for number, original in shared.items() if number not in used_elsewhere}
+class _Points:
+    """Points of a file, rounded.
+
+    Attributes
+    ----------
+    texts : dict
+        The coordinates of each point, by its id.
+    shared : dict
+        For each pole that repeats an earlier point, the earlier one's id.
+    """
+
+    def __init__(self, source: Path) -> None:
+        self.texts: dict[str, str] = {}
+        first: dict[str, str] = {}
+        shared: dict[str, str] = {}
+        used_elsewhere: set[str] = set()
+        with source.open(encoding="utf-8") as lines:
+            for entity in _entities(lines):
+                if point := _POINT.match(entity):
+                    number, rounded = point[1], _rounded(point[2])
+                    original = first.setdefault(rounded, number)
+                    if original == number:
+                        self.texts[number] = rounded
+                    else:
+                        # One string for all that are alike.
+                        self.texts[number] = self.texts[original]
+                        shared[number] = original
+                elif _SPLINE not in entity:
+                    used_elsewhere.update(_REFERENCE.findall(entity))
+        self.shared = {number: original for number, original in shared.items() if number not in used_elsewhere}
 
 
-def _rewritten(entity: str, shared: dict[str, str]) -> str:
+def _rewritten(entity: str, points: _Points) -> str:
     if point := _POINT.match(entity):
-        return "" if point[1] in shared else f"#{point[1]}=CARTESIAN_POINT('',({_rounded(point[2])}));\n"
+        number = point[1]
+        return "" if number in points.shared else f"#{number}=CARTESIAN_POINT('',({points.texts[number]}));\n"
     if entity.startswith("#") and _SPLINE in entity:
         unfolded = "".join(part.strip() for part in entity.splitlines()).replace(" = ", "=", 1)
-        return _REFERENCE.sub(lambda match: "#" + shared.get(match[1], match[1]), unfolded) + "\n"
+        return _REFERENCE.sub(lambda match: "#" + points.shared.get(match[1], match[1]), unfolded) + "\n"
     return entity
 
 
@@ -97,8 +114,11 @@ def _rounded(coordinates: str) -> str:
 
 def _real(text: str) -> str:
     """A number as ISO 10303-21 wants it: always with a point, an exponent in capitals."""
-    mantissa, mark, exponent = f"{round(float(text), _NOISE_DECIMALS) + 0.0:.{_SIGNIFICANT_DIGITS}g}".partition("e")
-    return (mantissa if "." in mantissa else mantissa + ".") + mark.upper() + exponent
+    number = f"{round(float(text), _NOISE_DECIMALS) + 0.0:.{_SIGNIFICANT_DIGITS}G}"
+    if "." in number:
+        return number
+    mantissa, mark, exponent = number.partition("E")
+    return f"{mantissa}.{mark}{exponent}"
 
 
 # A host that wrote a file in inches leaves the kernel taking all lengths of shapes for inches.

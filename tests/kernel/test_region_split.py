@@ -21,7 +21,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel import region_split, regions
+from gyroid_cad.kernel import processes, region_split, regions
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part, measure, require_part
@@ -202,7 +202,7 @@ def test_where_no_process_can_be_started_regions_are_split_here_with_the_same_re
     if why == "one processor":
         monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     elif why == "another system":
-        monkeypatch.setattr(regions.sys, "platform", "darwin")
+        monkeypatch.setattr(processes.sys, "platform", "darwin")
     else:
         monkeypatch.setattr(regions.multiprocessing.current_process(), "daemon", True, raising=False)
     told: list[tuple[int, int]] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -57,6 +58,19 @@ def test_what_is_run_beside_an_example_is_no_less_run() -> None:
 def test_ci_runs_the_readmes_test_command_word_for_word() -> None:
     (test_command,) = [line for line in README.splitlines() if line.endswith("-m pytest")]
     assert test_command in (ROOT / ".ci" / "run").read_text().splitlines()
+
+
+def test_the_extras_that_are_named_are_there_and_each_host_has_one() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    named = set(re.findall(r'pip install (?:-e )?"\.\[(\w+)\]"', README))
+    assert {"build123d", "cadquery", "hosts"} <= named <= set(extras)
+
+
+def test_ci_finds_the_command_that_the_wheel_alone_has_to_run() -> None:
+    # As .ci/run does: were it to find none, it would run none.
+    (pattern,) = re.findall(r"sed -n 's\|(.*?)\|", (ROOT / ".ci" / "run").read_text())
+    (first,) = re.findall(pattern.replace(r"\(", "(").replace(r"\)", ")"), README, flags=re.MULTILINE)
+    assert first == next(line for line in README.splitlines() if "pip install . &&" in line).split(".venv/bin/")[-1]
 
 
 def test_the_build_command_makes_step_and_stl_of_two_cells_cubed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,7 @@ def along_an_offset_curve() -> Any:
     curve = Geom_OffsetCurve(GeomAPI_PointsToBSpline(points).Curve(), 3.0, gp_Dir(0, 0, 1))
     start, end = curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())
     corners = [end, gp_Pnt(end.X(), -20, 0), gp_Pnt(start.X(), -20, 0), start]
-    straight = [BRepBuilderAPI_MakeEdge(a, b).Edge() for a, b in zip(corners, corners[1:], strict=False)]
+    straight = [BRepBuilderAPI_MakeEdge(a, b).Edge() for a, b in pairwise(corners)]
     wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(curve).Edge(), *straight).Wire()
     return BRepPrimAPI_MakePrism(BRepBuilderAPI_MakeFace(wire).Face(), gp_Vec(0, 0, 5)).Shape()
 
@@ -63,15 +64,14 @@ def test_a_part_that_others_drew_is_written_whole_or_not_at_all(part: Path | Non
     if part is None:
         pytest.skip("the folder of parts is not there")
     shape = read_step(part)
-    try:
-        write_step(shape, tmp_path / "a.step", parameter_curves=True)
-    except ExportError as refused:
+    if part.stem == "dm1-id-214":
         # An assembly, of which the writer puts down one solid for all of its places.
-        assert "of 7 solids" in str(refused)
-        assert list(tmp_path.iterdir()) == []
-    else:
-        found, wanted = topology_in_step(tmp_path / "a.step"), topology(shape)
-        assert (found.solids, found.faces, found.open_edges) == (wanted.solids, wanted.faces, 0)
+        with pytest.raises(ExportError, match="3 of 7 solids"):
+            write_step(shape, tmp_path / "a.step", parameter_curves=True)
+        return
+    write_step(shape, tmp_path / "a.step", parameter_curves=True)
+    found, wanted = topology_in_step(tmp_path / "a.step"), topology(shape)
+    assert (found.solids, found.faces, found.open_edges) == (wanted.solids, wanted.faces, 0)
 
 
 def test_a_file_whose_writer_left_faces_out_is_not_left_behind(tmp_path: Path) -> None:

@@ -154,8 +154,10 @@ def endless_infill(
     ------
     ParameterError, SelfIntersectionError, FitError
     """
-    thickness, density = (_in_frame(value, frame) for value in (regions.thickness, regions.density))
     low, high = part.low, part.high
+    # So that no digits are lost in places of a lattice whose origin is far away.
+    frame = frame.nearest_to((low + high) / 2, cell_size)
+    thickness, density = (_in_frame(value, frame) for value in (regions.thickness, regions.density))
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
@@ -27,9 +29,9 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
-from gyroid_cad.kernel.extent import bounding_box
+from gyroid_cad.kernel.extent import bounding_box, box_round
 from gyroid_cad.trim.box import Box
 
 __all__ = ["Part", "measure", "require_part", "selected_faces"]
@@ -42,6 +44,8 @@ _DEFLECTION = 1e-3
 _ANGULAR_DEFLECTION = 0.5
 _CLASSIFYING_TOLERANCE = 1e-7
 _BOX_FACES, _BOX_CORNERS = 6, 8
+# Of two solids, in parts of the smaller one: less may be rounding, where they touch in a line.
+_SHARED = 1e-6
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
 
@@ -126,10 +130,27 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
         volumes.append(measure(solid)[0])
         if not volumes[-1] > 0:
             raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
+    _require_apart(solids, parameter, kind)
     low, high = bounding_box(shape)
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
     return Part(divided, solids, low, high, sum(volumes), _box_of(solids))
+
+
+def _require_apart(solids: Sequence[TopoDS_Solid], parameter: str, kind: str) -> None:
+    """Refuse solids that have space or faces in common: the boundary of what they take up is then none of theirs."""
+    boxes = [box_round([solid]) for solid in solids]
+    for first, second in combinations(range(len(solids)), 2):
+        if boxes[first].IsOut(boxes[second]):
+            continue
+        pair = [solids[first], solids[second]]
+        common = measure(BRepAlgoAPI_Common(*pair).Shape())[0]
+        touching = measure(BRepAlgoAPI_Common(*(compound_of(parts_of(one, TopAbs_FACE)) for one in pair)).Shape())[1]
+        volume, area = (min(sizes) for sizes in zip(*map(measure, pair), strict=True))
+        amount = f"{common:.4g} mm3" if common > _SHARED * volume else f"{touching:.4g} mm2 of their faces"
+        if common > _SHARED * volume or touching > _SHARED * area:
+            which = f"solids {first + 1} and {second + 1} of {len(solids)} have {amount} in common"
+            raise ParameterError(parameter, kind, f"solids that neither overlap nor touch: {which}; fuse them first")
 
 
 def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
@@ -278,11 +299,17 @@ def _centre(face: TopoDS_Face) -> tuple[float, float, float]:
     return centre.X(), centre.Y(), centre.Z()
 
 
+def _away(distance: float) -> str:
+    return f"the nearest is {distance:.4g} mm away" if np.isfinite(distance) else "none is anywhere near"
+
+
 def _nearest(part: Part, faces: list[TopoDS_Face], point: Floats) -> TopoDS_Face:
     vertex = BRepBuilderAPI_MakeVertex(gp_Pnt(*point.tolist())).Vertex()
-    distances = [BRepExtrema_DistShapeShape(vertex, face).Value() for face in faces]
+    searches = (BRepExtrema_DistShapeShape(vertex, face) for face in faces)
+    # Of a point much too far off the kernel finds no distance.
+    distances = [found.Value() if found.IsDone() else np.inf for found in searches]
     nearest = int(np.argmin(distances))
     if distances[nearest] > _ON_FACE * float(np.max(part.high - part.low)):
         shown = tuple(point.tolist())
-        raise ParameterError("openings", shown, f"a point on a face; the nearest is {distances[nearest]:.4g} mm away")
+        raise ParameterError("openings", shown, f"a point on a face; {_away(distances[nearest])}")
     return faces[nearest]

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.common.graph import connected
-from gyroid_cad.errors import KernelError
+from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
@@ -39,6 +40,7 @@ __all__ = [
     "frame_of",
     "patch_sides",
     "periodic_offsets",
+    "placement",
     "wall_extremes",
 ]
 
@@ -55,6 +57,9 @@ SIDE_SAMPLES = 7
 # them.
 PERTURBATIONS = ((0.0, 0.0, 0.0), (0.0031, 0.0047, 0.0023), (-0.0053, 0.0029, 0.0071))
 _OFFSET_SAMPLES = 17
+# In mm: there a double's last digit is 2e-9 mm, a fiftieth of what the kernel tells apart.
+FURTHEST_ORIGIN = 1e7
+FULL_TURN = 360.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +83,11 @@ class Frame:
     def placed(self, points: Floats) -> Floats:
         """Points of the lattice's own space in the part's; shape (..., 3)."""
         return points @ self.rotation.T + self.origin
+
+    def nearest_to(self, point: Floats, cell_size: float) -> Frame:
+        """Return the frame moved by whole cells, which an endless lattice does not know, to be nearest to a point."""
+        cells = np.round(self.own(point) / cell_size)
+        return Frame(self.placed(cells * cell_size), self.rotation)
 
     def within(self, outer: Frame) -> Frame:
         """Return the frame that this one is, placed by another."""
@@ -138,6 +148,26 @@ def block_extent(cells: tuple[int, int, int], cell_size: float) -> BoxExtent:
     margin = max(max(map(abs, shift)) for shift in PERTURBATIONS) * cell_size
     x, y, z = (count * cell_size + margin for count in cells)
     return BoxExtent((-margin, -margin, -margin), (x, y, z))
+
+
+def placement(origin: object, rotation: object) -> tuple[Point, Point]:
+    """Check where a user places a lattice: its origin in mm, and its angles about the axes in degrees.
+
+    Raises
+    ------
+    ParameterError
+    """
+    checked = []
+    for parameter, value, most, unit in (
+        ("origin", origin, FURTHEST_ORIGIN, "mm"),
+        ("rotation", rotation, FULL_TURN, "degrees"),
+    ):
+        numbers = three_numbers(parameter, value)
+        if np.abs(numbers).max() > most:
+            raise ParameterError(parameter, value, f"three numbers from -{most:,.0f} to {most:,.0f} {unit}")
+        x, y, z = numbers.tolist()
+        checked.append((x, y, z))
+    return checked[0], checked[1]
 
 
 def frame_of(origin: Point | Floats, rotation: Point | Floats) -> Frame:

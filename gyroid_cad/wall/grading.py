@@ -18,7 +18,7 @@ from gyroid_cad.fields.field import Field, evaluated, given_as
 from gyroid_cad.maps.space import OPEN, SpaceMap, carried, differences
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 
-__all__ = ["THINNEST_WALL", "Extent", "Grading", "WallPoints"]
+__all__ = ["LARGEST_CELL", "SMALLEST_CELL", "THINNEST_WALL", "Extent", "Grading", "WallPoints"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -29,6 +29,8 @@ Integers = NDArray[np.int64]
 _STEP = 2e-4
 # In mm. The kernel takes lengths under 1e-7 mm for nothing; this keeps every wall well above.
 THINNEST_WALL = 1e-4
+# In mm, before and after a scale. The kernel takes lengths under 1e-7 mm for nothing; these keep every edge well above.
+SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
 # How far below zero a wall goes on beyond the part as it comes, and how far then at most, in parts of the thickest, or
 # densest, there may be.
 _AS_IT_COMES, _AT_MOST = 0.1, 0.4
@@ -185,12 +187,22 @@ class Grading:
         def scale(points: Floats) -> Floats:
             return _values(name, self.scale_field, points.T)
 
-        factor, slope = scale(places), differences(scale, places, _STEP * self.cell_size)
+        factor = scale(places)
         _require(name, factor, places.T, 0.0, "above", "everywhere in the lattice")
+        self._require_scaled_cells(name, factor, places.T)
+        slope = differences(scale, places, _STEP * self.cell_size)
         jacobian = places[:, np.newaxis] * slope
         for axis in range(3):
             jacobian[axis, axis] += factor
         return factor * places, jacobian
+
+    def _require_scaled_cells(self, name: str, factor: Floats, points: Floats) -> None:
+        least, most = SMALLEST_CELL / self.cell_size, LARGEST_CELL / self.cell_size
+        worst = int(np.argmax(factor))
+        if factor[worst] > most:
+            reason = f"where cells are {LARGEST_CELL:g} mm large"
+            raise SelfIntersectionError(name, float(factor[worst]), _place(points, worst), most, reason, "at most")
+        _require(name, factor, points, least, "at least", f"where cells are {SMALLEST_CELL:g} mm small")
 
     def requested(self, points: Floats) -> Floats:
         """The thickness in mm, or the density, asked for at points of the lattice's own space; shape (n,).

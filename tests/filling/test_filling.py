@@ -44,6 +44,12 @@ def ball() -> cq.Workplane:
     return cq.Workplane(origin=(5.0, 4.0, 6.0)).sphere(2.2)
 
 
+def two_boxes(apart: float) -> cq.Workplane:
+    """Two cubes of 4 mm, one so far along x from the other."""
+    boxes = [cq.Workplane().box(4, 4, 4).translate((x, 0, 0)).val() for x in (0, apart)]
+    return cq.Workplane(cq.Compound.makeCompound(boxes))
+
+
 @lru_cache(maxsize=8)
 def filled(kind: str = "sheet", density: float | None = None) -> Filled:
     wall = WALL if density is None else None
@@ -307,6 +313,14 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"kind": "network-a", "thickness": None, "density": 0.01}, "above 0.02983"),
         ({"origin": (0, 0)}, "origin = (0, 0): expected three finite numbers"),
         ({"rotation": 3}, "rotation = 3: expected three finite numbers"),
+        ({"origin": (0, 0, 1e300)}, "three numbers from -10,000,000 to 10,000,000 mm"),
+        ({"rotation": (0, 361, 0)}, "three numbers from -360 to 360 degrees"),
+        ({"skin": 1e-300}, "skin = 1e-300: expected at least 0.0001 mm"),
+        ({"skin": 0.4, "openings": [(1e300, 0, 0)]}, "a point on a face; none is anywhere near"),
+        ({"material_density": 7850}, "g/cm3, at most 100: of water it is 1"),
+        ({"lattice": Lattice((1, 1, 1), 10, 1, scale_field=1e300), "cell_size": None, "thickness": None}, "at most 1"),
+        ({"part": two_boxes(2)}, "solids 1 and 2 of 2 have 32 mm3 in common; fuse them first"),
+        ({"part": two_boxes(4)}, "solids 1 and 2 of 2 have 16 mm2 of their faces in common; fuse them first"),
         ({"material_density": -1}, "material_density = -1"),
         ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's smallest extent, 0.5 mm"),
     ],
@@ -317,6 +331,19 @@ def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], wor
         fill(**arguments)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_solids_that_meet_in_an_edge_are_no_reason_to_refuse() -> None:
+    part = part_of(cq.Workplane(cq.Compound.makeCompound([cq.Workplane().box(4, 4, 4).val(),
+        cq.Workplane().box(4, 4, 4).translate((4, 4, 0)).val()])))  # fmt: skip
+    assert part.volume == pytest.approx(128)
+
+
+def test_a_lattice_from_far_away_fills_a_part_as_one_moved_by_whole_cells_does() -> None:
+    given = {"thickness": "0.8 + 0.05*x", "fit": COARSE, "tolerance": 1e-3}
+    far = fill(ball(), CELL, origin=(9_999_990.0, -9_999_990.0, 1e7), **given).report
+    near = fill(ball(), CELL, **given).report
+    assert (far.volume, far.area) == pytest.approx((near.volume, near.area), rel=1e-6)
 
 
 @pytest.mark.parametrize("content", [b"", b"not STEP at all", b"ISO-10303-21;\nHEADER;\nENDSEC;\n"])

@@ -72,7 +72,7 @@ class SelfIntersectionError(ParameterError):
         The largest value that would pass there; the least for other values of ``accepted``.
     reason : str
         What the limit is.
-    accepted : {"below", "above", "at least"}
+    accepted : {"below", "above", "at least", "at most"}
     quantity : str
         What the value is of, if it is not the parameter itself.
     unit : str

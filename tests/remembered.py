@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from gyroid_cad.filling import fill as filling
+from gyroid_cad.surface.fit import FitSettings
 
 
 def filled_once(fill: Callable[..., Any]) -> Callable[..., Any]:
@@ -18,6 +19,7 @@ def filled_once(fill: Callable[..., Any]) -> Callable[..., Any]:
         bound = signature.bind(*given, **named)
         bound.apply_defaults()
         settings = {name: plain(value) for name, value in bound.arguments.items() if name not in ("part", "progress")}
+        settings["fit"] = settings["fit"] or FitSettings()
         part = filling.part_of(bound.arguments["part"])
         size = *part.low.round(6).tolist(), *part.high.round(6).tolist(), round(part.volume, 6)
         key = size, tuple(settings.items())

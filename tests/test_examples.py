@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import runpy
 import shutil
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import pytest
 from documented import ROOT, Block, blocks_of, missing, run_shell
@@ -50,7 +52,15 @@ def test_an_example_runs_and_its_step_file_is_valid(
     clone, folder = tmp_path / "clone", tmp_path / "example"
     shutil.copytree(ROOT / "examples", clone / "examples")
     folder.mkdir()
-    monkeypatch.setattr(filling, "fill", filled_once(filling.fill))
+    fills: list[Any] = []
+    fill = filling.fill
+
+    @wraps(fill)
+    def counted(*given: Any, **named: Any) -> Any:
+        fills.append(given)
+        return fill(*given, **named)
+
+    monkeypatch.setattr(filling, "fill", filled_once(counted))
     monkeypatch.chdir(clone)
     for block in readme_blocks(BESIDE.get(example.stem)):
         assert missing(block.printed or "", run_shell(block, capsys)) == []
@@ -58,6 +68,8 @@ def test_an_example_runs_and_its_step_file_is_valid(
     runpy.run_path(str(example), run_name="__main__")
     printed = capsys.readouterr().out
     assert printed.strip()
+    # What the README's commands filled is not filled again.
+    assert len(fills) <= example.read_text().count("fill(")
     promised = re.findall(r'"(\w+\.\w+)"', example.read_text())
     assert sorted(path.name for path in folder.iterdir()) == sorted(promised)
     for path in folder.glob("*.step"):

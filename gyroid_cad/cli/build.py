@@ -56,7 +56,7 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
     """Build a lattice as a closed solid, or as triangles, and write it.
 
     Expressions are of x, y and z in mm, of places in the lattice before anything is moved; pi and functions
-    such as sqrt, sin, exp and minimum are known. A TOML file has these options as keys, with underscores;
+    such as sqrt, sin, clip and smooth_minimum are known. A TOML file has these options as keys, with underscores;
     options given as well override it.
 
     \b

@@ -116,6 +116,8 @@ FILE_BYTES_PER_CELL = 6_000_000
 _KERNEL_SCHEMAS: Mapping[Schema, str] = MappingProxyType({"ap214": "AP214IS", "ap242": "AP242DIS"})
 # Degrees between neighbouring facets.
 DEFAULT_ANGLE = 15.0
+# In degrees and mm: finer triangles are as many as no memory holds.
+SMALLEST_ANGLE, SMALLEST_DEVIATION = 0.1, 1e-6
 
 
 def format_of(path: str | os.PathLike[str]) -> Format | None:
@@ -227,8 +229,10 @@ def require_meshing(deviation: float, angle: float = DEFAULT_ANGLE) -> None:
     """
     if not (isinstance(deviation, Real) and isfinite(deviation) and deviation > 0):
         raise ParameterError("deviation", deviation, "a length above 0 mm")
-    if not (isinstance(angle, Real) and isfinite(angle) and 0 < angle < 90):
-        raise ParameterError("angle", angle, "above 0 and below 90 degrees")
+    if deviation < SMALLEST_DEVIATION:
+        raise ParameterError("deviation", deviation, f"at least {SMALLEST_DEVIATION:g} mm")
+    if not (isinstance(angle, Real) and isfinite(angle) and SMALLEST_ANGLE <= angle < 90):
+        raise ParameterError("angle", angle, f"{SMALLEST_ANGLE:g} or more and below 90 degrees")
 
 
 def require_settings(

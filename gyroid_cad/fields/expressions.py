@@ -17,7 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["DEEPEST_NESTING", "FUNCTIONS", "LONGEST_EXPRESSION", "VARIABLES", "Expression", "compile_expression"]
+__all__ = [
+    "DEEPEST_NESTING",
+    "FUNCTIONS",
+    "LONGEST_EXPRESSION",
+    "VARIABLES",
+    "Expression",
+    "compile_expression",
+    "smooth_greater",
+    "smooth_lesser",
+]
 
 Floats = NDArray[np.float64]
 Evaluator = Callable[[Mapping[str, Any]], Any]
@@ -28,6 +37,21 @@ DEEPEST_NESTING = 50  # brackets in brackets, calls in calls, signs before signs
 VARIABLES = ("x", "y", "z")
 _CONSTANTS = {"pi": np.float64(pi)}
 _VALUES = (*VARIABLES, *_CONSTANTS)
+
+
+def smooth_lesser(first: Any, second: Any, width: Any) -> Any:
+    """The lesser of two values, with the crease where they cross rounded by a parabola over a width above 0.
+
+    >>> [float(smooth_lesser(1.0, other, 2.0)) for other in (1.0, 2.0, 4.0)]
+    [0.5, 0.875, 1.0]
+    """
+    overlap = np.maximum(1 - np.abs(np.subtract(first, second)) / width, 0)
+    return np.minimum(first, second) - overlap**2 * width / 4
+
+
+def smooth_greater(first: Any, second: Any, width: Any) -> Any:
+    """The greater of two values, rounded as by :func:`smooth_lesser`."""
+    return -smooth_lesser(np.negative(first), np.negative(second), width)
 
 
 def _clip(value: Any, lowest: Any, highest: Any) -> Any:
@@ -43,7 +67,11 @@ _CALLS: dict[str, tuple[Callable[..., Any], int]] = {
     **{ufunc.__name__: (ufunc, ufunc.nin) for ufunc in _UFUNCS},
     "abs": (np.absolute, 1),
     "clip": (_clip, 3),
+    "smooth_maximum": (smooth_greater, 3),
+    "smooth_minimum": (smooth_lesser, 3),
 }
+# Functions whose last argument is the same everywhere, and above 0: as in Python, where it is a number.
+_OF_A_WIDTH = ("smooth_maximum", "smooth_minimum")
 FUNCTIONS = tuple(sorted(_CALLS))
 
 _OPERATIONS: dict[type[ast.AST], Callable[..., Any]] = {
@@ -273,7 +301,17 @@ class _Reader:
         if len(arguments) != count:
             plural = "s" if count > 1 else ""
             raise self._refusal(f"{self._quoted(name)} takes {count} argument{plural}, not {len(arguments)}")
+        if name.id in _OF_A_WIDTH:
+            self._require_width(node.args[-1], arguments[-1])
         return lambda at: function(*(argument(at) for argument in arguments))
+
+    def _require_width(self, node: ast.expr, evaluate: Evaluator) -> None:
+        varies = any(isinstance(inner, ast.Name) and inner.id in VARIABLES for inner in ast.walk(node))
+        if not varies:
+            with np.errstate(all="ignore"):
+                varies = not 0 < evaluate(_CONSTANTS) < inf
+        if varies:
+            raise self._refusal(f"the width {self._quoted(node)} must be a finite number above 0")
 
 
 def _float64(value: float) -> np.float64:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, finite_numbers, positive_number, three_numbers
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.expressions import smooth_greater, smooth_lesser
 from gyroid_cad.fields.field import Field, Floats, as_field, call_text, compiled_field, derived, shown
 
 __all__ = [
@@ -175,25 +176,19 @@ def smooth_minimum(first: Field | float | str, second: Field | float | str, widt
     ParameterError
         If the width is not above 0, or one of the two is neither a number, an expression nor a Field.
     """
-    return _blend("smooth_minimum", 1.0, first, second, width)
+    return _blend("smooth_minimum", smooth_lesser, first, second, width)
 
 
 def smooth_maximum(first: Field | float | str, second: Field | float | str, width: float) -> Field:
     """The greater of two fields, rounded as by :func:`smooth_minimum`."""
-    return _blend("smooth_maximum", -1.0, first, second, width)
+    return _blend("smooth_maximum", smooth_greater, first, second, width)
 
 
-def _blend(name: str, sign: float, first: object, second: object, width: float) -> Field:
+def _blend(name: str, blend: Callable[..., Floats], first: object, second: object, width: float) -> Field:
     given = [as_field(*named, "one of the two to blend") for named in (("first", first), ("second", second))]
     parts = tuple(part if isinstance(part, Field) else constant(part) for part in given)
     reach = positive_number("width", width)
-
-    def blend(one: Floats, other: Floats) -> Floats:
-        overlap = np.maximum(1 - np.abs(one - other) / reach, 0)
-        lesser: Floats = np.minimum(sign * one, sign * other)
-        return sign * (lesser - overlap**2 * reach / 4)
-
-    return derived(blend, parts, call_text(name, *given, reach))
+    return derived(lambda one, other: blend(one, other, reach), parts, call_text(name, *given, reach))
 
 
 def _unit(parameter: str, direction: Floats) -> Floats:

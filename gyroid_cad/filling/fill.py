@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
+from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
 from gyroid_cad.common.progress import Progress, timed
@@ -22,7 +22,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
-from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, regions_of
+from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, grams_of, regions_of, skin_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
@@ -36,7 +36,7 @@ from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.islands import Islands, island_rule
-from gyroid_cad.wall.covering import Frame, frame_of
+from gyroid_cad.wall.covering import Frame, frame_of, placement
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
 
 __all__ = ["FillReport", "Filled", "fill"]
@@ -279,9 +279,9 @@ def fill(
         If the kernel fails, or gives something that is not closed, not valid, or of the wrong volume; or cannot
         offset the part by its skin.
     """
-    frame = frame_of(three_numbers("origin", origin), three_numbers("rotation", rotation))
-    grams = None if material_density is None else positive_number("material_density", material_density) / 1000
-    shell = None if skin is None else positive_number("skin", skin, "a length in mm, a finite number above 0")
+    frame = frame_of(*placement(origin, rotation))
+    grams = None if material_density is None else grams_of(material_density)
+    shell = None if skin is None else skin_of(skin)
     if openings and shell is None:
         raise ParameterError("openings", openings, "none without a skin")
     if shell is not None and kind == SURFACE:
@@ -333,7 +333,7 @@ def _described(
     wanted = regions_of(kind, size, thickness, density, surface.tube)
 
     def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
-        made = endless_infill(part.low, part.high, frame, size, wanted, fit, tolerance, timed, surface)
+        made = endless_infill(part, frame, size, wanted, fit, tolerance, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
             name, given = ("thickness", thickness) if density is None else ("density", density)

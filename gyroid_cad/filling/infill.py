@@ -12,7 +12,9 @@ from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field
+from gyroid_cad.filling.extent import extent_of
 from gyroid_cad.filling.wanted import Region, Regions
+from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
@@ -21,6 +23,7 @@ from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
     Frame,
+    PlacedExtent,
     covering_complex,
     patch_sides,
     periodic_offsets,
@@ -122,8 +125,7 @@ class Infill:
 
 
 def endless_infill(
-    low: Floats,
-    high: Floats,
+    part: Part,
     frame: Frame,
     cell_size: float,
     regions: Regions,
@@ -132,12 +134,11 @@ def endless_infill(
     timed: Timed,
     surface: MinimalSurface,
 ) -> Infill:
-    """An endless lattice, as far as a box in the part's space needs it.
+    """An endless lattice, as far as a part needs it; fields are heeded where its wall may be in the part.
 
     Parameters
     ----------
-    low, high : ndarray, shape (3,)
-        Of the box, in mm.
+    part : Part
     frame : Frame
     cell_size : float
         In mm.
@@ -153,12 +154,17 @@ def endless_infill(
     ------
     ParameterError, SelfIntersectionError, FitError
     """
+    low, high = part.low, part.high
+    # So that no digits are lost in places of a lattice whose origin is far away.
+    frame = frame.nearest_to((low + high) / 2, cell_size)
     thickness, density = (_in_frame(value, frame) for value in (regions.thickness, regions.density))
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
+            if not grading.uniform:
+                grading = replace(grading, extent=PlacedExtent(extent_of(part, cell_size), frame))
             min_thickness, max_thickness = wall_extremes(low, high, frame, grading)
-            complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface)
+            complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface, grading.extent)
         wall, refit = fit_wall(complex, grading, fit, tolerance, timed)
     except SelfIntersectionError as error:
         raise _moved(error, frame) from None

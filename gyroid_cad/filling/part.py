@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.kernel.apart import read_shape
@@ -34,12 +34,12 @@ __all__ = ["Filling", "Made", "Outcome", "part_of", "without_islands"]
 
 Floats = NDArray[np.float64]
 
-# Points on the boundary, in cell sizes: so far apart that the patches it crosses are told closely, and quickly.
-_BOUNDARY_SPACING = 1 / 12
 # An estimate of the volume from so many points; further off than so many of its deviations, something is wrong.
 _ESTIMATE_POINTS, _ESTIMATE_DEVIATIONS, _ESTIMATE_ERROR = 4096, 6.0, 0.02
 # Of the layer round a bare surface whose volume tells its area, in cell sizes.
 _SURFACE_LAYER = 0.05
+# In mm. The kernel's sections of the two faces of a thinner wall run into each other.
+_THIN_WALL = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +142,13 @@ class Filling:
         infill = self.infill_in(replace(frame, origin=frame.origin + shift), self.timed)
         # A block's own side walls are none of the faces that sections are found of.
         by_sections = by_sections and infill.endless
-        made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
+        try:
+            made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
+        except KernelError as failed:
+            if infill.min_thickness >= _THIN_WALL or all(region.surface for region in self.regions):
+                raise
+            thin = f"{infill.min_thickness:.3g} mm"
+            raise KernelError(f"{failed}; the wall is {thin} where it is thinnest, too thin to be cut") from failed
         with self.timed("check"):
             for region in self.regions:
                 self._require_right_size(infill, region, made[region.name], points)
@@ -187,7 +193,7 @@ class Filling:
     def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
 
         with self.timed("cover"):
-            sides = infill.sides(self._distance_from_boundary(), self.core.contains)
+            sides = infill.sides(PartExtent(self.core, self.cell_size).clearance, self.core.contains)
         made = {}
         for region in self.regions:
             with self.timed("faces"):
@@ -217,12 +223,6 @@ class Filling:
                     for shape in shapes
                 ]
         return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
-
-    def _distance_from_boundary(self) -> Callable[[Floats], Floats]:
-
-        samples, error = self.core.surface_samples(_BOUNDARY_SPACING * self.cell_size)
-        tree = cKDTree(samples)
-        return lambda points: np.asarray(tree.query(points)[0]) - error
 
     def _require_right_size(self, infill: Infill, region: Region, made: list[Made], points: Floats) -> None:
         """Compare with an estimate that asks no boolean: how many of the points in the part lie in the region."""

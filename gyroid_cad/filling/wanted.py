@@ -7,16 +7,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.checks import positive_number
 from gyroid_cad.common.choices import KINDS, Kind
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
+from gyroid_cad.wall.grading import THINNEST_WALL
 from gyroid_cad.wall.parameters import require_density, require_one, require_thickness
 
-__all__ = ["CHANNELS", "NETWORK_A", "NETWORK_B", "SHEET", "SURFACE", "Region", "Regions", "regions_of"]
+__all__ = [
+    "CHANNELS",
+    "NETWORK_A",
+    "NETWORK_B",
+    "SHEET",
+    "SURFACE",
+    "Region",
+    "Regions",
+    "grams_of",
+    "regions_of",
+    "skin_of",
+]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
+
+# Of materials, in g/cm3: osmium has 22.6, and steel in kg/m3 7850.
+_DENSEST = 100.0
 
 SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS
 
@@ -141,3 +157,23 @@ def _network(kind: Kind, cell_size: float, density: FieldLike | None, tube: Tube
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)
     return Regions((region,), thickness=2 * abs(offset))
+
+
+def grams_of(material_density: float) -> float:
+    """Density of a material in g/mm3, of what is given in g/cm3; raises ParameterError.
+
+    >>> grams_of(2.7)
+    0.0027
+    """
+    number = positive_number("material_density", material_density)
+    if number > _DENSEST:
+        raise ParameterError("material_density", material_density, f"g/cm3, at most {_DENSEST:g}: of water it is 1")
+    return number / 1000
+
+
+def skin_of(skin: float) -> float:
+    """Thickness of a skin in mm, checked; raises ParameterError."""
+    thickness = positive_number("skin", skin, "a length in mm, a finite number above 0")
+    if thickness < THINNEST_WALL:
+        raise ParameterError("skin", skin, f"at least {THINNEST_WALL:g} mm, the thinnest wall")
+    return thickness

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import pickle
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,6 +19,7 @@ from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.brep import read_brep
 from gyroid_cad.kernel.check import compound_of
+from gyroid_cad.kernel.processes import Started, started
 from gyroid_cad.kernel.step import read_step
 
 __all__ = [
@@ -28,7 +29,6 @@ __all__ = [
     "read_apart",
     "read_shape",
     "require_cad_file",
-    "started",
     "step_contents",
 ]
 
@@ -42,26 +42,6 @@ _HEADER_BYTES = 4096
 SECONDS_AT_LEAST, SECONDS_PER_MB = 60.0, 60.0
 # Names of what the other process leaves in a folder.
 _SHAPES, _VALUES, _PROBLEM = "shapes", "values", "problem"
-
-
-def started(program: str, *arguments: str) -> subprocess.Popen[bytes]:
-    """Start a Python program that finds the same modules; nothing that it prints is seen.
-
-    Parameters
-    ----------
-    program : str
-        Its text.
-    *arguments : str
-        As ``sys.argv[1:]``.
-    """
-    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
-    return subprocess.Popen(
-        [sys.executable, "-c", program, *arguments],
-        env={**os.environ, "PYTHONPATH": paths},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
 
 
 def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
@@ -113,9 +93,7 @@ def read_apart(path: str | os.PathLike[str], reader: Callable[[str], Contents]) 
         # A program that was packed into one file has no Python to start.
         if getattr(sys, "frozen", False):
             return reader(known)
-        name = reader.__name__
-        program = f"from {__name__} import answer; from {reader.__module__} import {name}; answer({name})"
-        _run(path, started(program, known, folder))
+        _run(path, started(answer, reader.__module__, reader.__name__, known, folder))
         if Path(folder, _PROBLEM).exists():
             problem = Path(folder, _PROBLEM).read_text(encoding="utf-8")
             raise ExportError(problem.replace(known, str(path)))
@@ -124,11 +102,10 @@ def read_apart(path: str | os.PathLike[str], reader: Callable[[str], Contents]) 
         return _parts(compound), pickle.loads(Path(folder, _VALUES).read_bytes())
 
 
-def answer(reader: Callable[[str], Contents]) -> None:
-    """Read the file that the command line names, and leave its contents, or the problem with it, in a folder."""
-    known, folder = sys.argv[1:]
+def answer(module: str, reader: str, known: str, folder: str) -> None:
+    """Read a file by a function of a module, and leave its contents, or the problem with it, in a folder."""
     try:
-        shapes, values = reader(known)
+        shapes, values = getattr(import_module(module), reader)(known)
         if not BinTools.Write_s(compound_of(shapes), str(Path(folder, _SHAPES))):
             raise ExportError(f"{known} could not be read: the folder for temporary files is full")
         Path(folder, _VALUES).write_bytes(pickle.dumps(values))
@@ -136,17 +113,16 @@ def answer(reader: Callable[[str], Contents]) -> None:
         Path(folder, _PROBLEM).write_text(str(failed), encoding="utf-8")
 
 
-def _run(path: str | os.PathLike[str], process: subprocess.Popen[bytes]) -> None:
+def _run(path: str | os.PathLike[str], process: Started) -> None:
     """Wait for a process that reads a file: longer, the larger that is."""
     allowed = SECONDS_AT_LEAST + SECONDS_PER_MB * Path(path).stat().st_size / 1e6
     try:
-        process.wait(allowed)
-    except subprocess.TimeoutExpired:
-        raise ExportError(f"{path} could not be read: the kernel was still at it after {allowed:.0f} s") from None
+        status = process.wait(allowed)
     finally:
         process.kill()
-        process.wait()
-    if process.returncode:
+    if status is None:
+        raise ExportError(f"{path} could not be read: the kernel was still at it after {allowed:.0f} s")
+    if status:
         raise ExportError(f"{path} could not be read: the kernel crashes on it, as on a file that is damaged")
 
 

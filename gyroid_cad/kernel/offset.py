@@ -6,8 +6,6 @@ that is for :mod:`gyroid_cad.kernel.offset` to find out.
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
@@ -34,10 +32,10 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.apart import started
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths
+from gyroid_cad.kernel.processes import Started, started
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
 
@@ -45,7 +43,6 @@ Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 
 _TOLERANCE = 1e-5
 _SECONDS_AT_MOST, _SECONDS_BETWEEN_LOOKS = 60.0, 0.02
-_WORK = "from gyroid_cad.kernel.offset import work; work()"
 _SOLID = "solid.bin"
 
 
@@ -69,32 +66,30 @@ def offsets(
         BinTools.Write_s(solid, str(Path(folder, _SOLID)))
         left = list(ways)
         while left:
-            process = started(_WORK, folder, repr(skin), ",".join(map(str, numbers)), *left)
+            process = started(work, folder, repr(skin), ",".join(map(str, numbers)), *left)
             try:
                 while left and (found := _awaited(process, Path(folder, left[0]))):
                     left.pop(0)
                     yield _read(found) if found.stat().st_size else None
             finally:
                 process.kill()
-                process.wait()
             if left:
                 left.pop(0)
                 yield None
 
 
-def _awaited(process: subprocess.Popen[bytes], path: Path) -> Path | None:
+def _awaited(process: Started, path: Path) -> Path | None:
     """The path once there is a file; None if the process ends before, or takes too long."""
     end = time.monotonic() + _SECONDS_AT_MOST
     while not path.exists():
-        if time.monotonic() > end or (process.poll() is not None and not path.exists()):
+        ended = process.wait(_SECONDS_BETWEEN_LOOKS) is not None
+        if time.monotonic() > end or (ended and not path.exists()):
             return None
-        time.sleep(_SECONDS_BETWEEN_LOOKS)
     return path
 
 
-def work() -> None:
-    """Offset the solid in a folder in each of the ways that the command line says, and leave there what they give."""
-    folder, skin, numbers, *ways = sys.argv[1:]
+def work(folder: str, skin: str, numbers: str, *ways: str) -> None:
+    """Offset the solid in a folder in each of some ways, and leave there what they give."""
     for way in ways:
         given = _read(Path(folder, _SOLID))
         place = _place(given)

@@ -10,9 +10,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -23,32 +20,12 @@ from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.part import Part
+from gyroid_cad.kernel.processes import can_fork, interrupts_later, processors, settle_in
 from gyroid_cad.kernel.region_merge import Joining
 from gyroid_cad.kernel.region_split import Found, RegionSplit, Task
 from gyroid_cad.kernel.split import Pieces, split
 
-__all__ = ["end_with_parent", "split_by_region"]
-
-# Of prctl(2): the signal that a process gets when the one that started it ends.
-_SET_SIGNAL_AT_PARENTS_END = 1
-
-
-def end_with_parent(parent: int) -> None:
-    """Let the system end this process at once when its parent ends, however that ends (Linux; elsewhere nothing).
-
-    Parameters
-    ----------
-    parent : int
-        Its number, as ``os.getpid`` gives it there: it may have ended already.
-    """
-    if sys.platform != "linux":
-        return
-    import ctypes  # not needed by those who never start a process
-
-    ctypes.CDLL(None).prctl(_SET_SIGNAL_AT_PARENTS_END, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
-
+__all__ = ["split_by_region"]
 
 # With fewer faces, starting processes is not worth it.
 _FEW = 64
@@ -86,21 +63,11 @@ def split_by_region(
             progress(len(faces), len(faces))
         return pieces
     task = Task(part, faces)
-    usable = _processors() if processes is None else processes
-    find = _found_in_processes if usable > 1 and _can_fork() else _found_here
+    usable = processors() if processes is None else processes
+    find = _found_in_processes if usable > 1 and can_fork() else _found_here
     found = find(task, usable, progress)
     with _kernel_errors():
         return Joining(task, found).pieces()
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _can_fork() -> bool:
-    # Elsewhere they could outlive this process; on macOS system libraries may crash in them. And a process of a pool,
-    # which ends with its parent, may have none of its own.
-    return sys.platform == "linux" and not multiprocessing.current_process().daemon
 
 
 def _found_here(task: Task, processes: int, progress: Callable[[int, int], None] | None) -> list[Found]:
@@ -130,7 +97,7 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
     )
     done = 0
     try:
-        with _interrupts_later():
+        with interrupts_later():
             futures = {executor.submit(_found, number): region for number, region in enumerate(task.regions)}
         for future in as_completed(futures):
             future.result()
@@ -155,28 +122,8 @@ def _found_in_processes(task: Task, processes: int, progress: Callable[[int, int
             executor.shutdown(cancel_futures=True)
 
 
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Hold interrupts back until the context ends: what comes while a process is forked, Python reports and forgets."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    heard: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
-    if heard:
-        signal.raise_signal(signal.SIGINT)
-
-
 def _begin(task: Task, parent: int) -> None:
-    """Make a process ready; a terminal interrupts all of a program's processes, and only the first has an answer."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # What the program answers to being ended is nothing that its processes should do.
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    end_with_parent(parent)
+    settle_in(parent)
     _inherited.append(task)
 
 

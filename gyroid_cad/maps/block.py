@@ -21,6 +21,8 @@ __all__ = ["MAPS", "Bend", "Cylinder", "Sphere", "Twist", "as_map", "parse_map",
 Floats = NDArray[np.float64]
 
 FULL_TURN = 360.0
+# In mm, 10 km; and in degrees. Beyond, a place on the map has too few digits for its neighbours to be told from it.
+_LARGEST_RADIUS, _MOST_TWIST = 1e7, 36_000.0
 # A block within a thousandth of the circumference is stretched to close: a radius rounded to a few digits fits.
 CLOSING_TOLERANCE = 1e-3
 
@@ -131,13 +133,16 @@ class Twist:
     Parameters
     ----------
     angle : float
-        In degrees, from the block's bottom to its top.
+        In degrees, from the block's bottom to its top; a hundred turns at most.
     """
 
     angle: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "angle", finite_number("angle", self.angle, "a finite number of degrees"))
+        angle = finite_number("angle", self.angle, "a finite number of degrees")
+        if abs(angle) > _MOST_TWIST:
+            raise ParameterError("angle", angle, f"-{_MOST_TWIST:,.0f} to {_MOST_TWIST:,.0f} degrees, a hundred turns")
+        object.__setattr__(self, "angle", angle)
 
     def over(self, size: Size) -> SpaceMap:
         """The twist of a block of this size."""
@@ -305,7 +310,10 @@ def _round(block_map: Cylinder | Sphere, length: float) -> tuple[float, bool]:
 
 
 def _check_round(block_map: Cylinder | Sphere) -> None:
-    radius = positive_number("radius", block_map.radius, "a finite number of mm above 0")
+    accepted = f"a finite number of mm above 0, at most {_LARGEST_RADIUS:,.0f}"
+    radius = positive_number("radius", block_map.radius, accepted)
+    if radius > _LARGEST_RADIUS:
+        raise ParameterError("radius", radius, accepted)
     object.__setattr__(block_map, "radius", radius)
     if block_map.angle is not None:
         object.__setattr__(block_map, "angle", _turn(block_map.angle))

@@ -33,6 +33,7 @@ __all__ = [
     "FitSettings",
     "FittedPatch",
     "edge_gap",
+    "error_within_reach",
     "fit_patch",
     "max_offset",
     "more_control_points",
@@ -108,6 +109,11 @@ class FitSettings:
     def weight_net(self) -> Floats:
         """The weights, 1 where none were given; shape (control_points, control_points)."""
         return np.ones((self.control_points,) * 2) if self.weights is None else np.array(self.weights)
+
+
+def error_within_reach(control_points: int, error: float) -> float:
+    """About the error of the finest fit, where one of so many control points, six or more, has ``error``."""
+    return error * ((control_points - DEGREE) / (MOST_CONTROL_POINTS - DEGREE)) ** _ORDER
 
 
 def more_control_points(control_points: int, excess: float) -> int:

@@ -17,6 +17,7 @@ from gyroid_cad.surface.fit import (
     FitSettings,
     FittedPatch,
     edge_gap,
+    error_within_reach,
     fit_patch,
     more_control_points,
 )
@@ -28,6 +29,8 @@ __all__ = ["FitReport", "fit_report", "fit_within"]
 _REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
 _FOOT_POINT_STEPS = 4
+# How far below what the finest fit is expected to reach a tolerance is refused without trying.
+_HOPELESS = 10
 # Less than this is rounding, of which the digits differ from machine to machine.
 _ROUNDING = 1e-15
 
@@ -114,6 +117,12 @@ def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID)
     """
     while (reached := fit_report(fit_patch(settings, family)).max_distance) > tolerance:
         n = settings.control_points
+        least = error_within_reach(n, reached)
+        if tolerance < least / _HOPELESS and settings.plain:
+            # The finest fit takes seconds.
+            raise ParameterError(
+                "tolerance", tolerance, f"at least about {least:.2g}, which {MOST_CONTROL_POINTS} control points reach"
+            )
         if n == MOST_CONTROL_POINTS or not settings.plain:
             raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
         settings = replace(settings, control_points=more_control_points(n, reached / tolerance))

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.common.graph import connected
-from gyroid_cad.errors import KernelError
+from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, Placements
 from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
-from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.grading import Extent, Grading
 
 __all__ = [
     "AT_HOME",
@@ -30,12 +31,16 @@ __all__ = [
     "OUTSIDE",
     "PERTURBATIONS",
     "SIDE_SAMPLES",
+    "BoxExtent",
     "Frame",
+    "PlacedExtent",
+    "block_extent",
     "covering_complex",
     "first_success",
     "frame_of",
     "patch_sides",
     "periodic_offsets",
+    "placement",
     "wall_extremes",
 ]
 
@@ -52,6 +57,9 @@ SIDE_SAMPLES = 7
 # them.
 PERTURBATIONS = ((0.0, 0.0, 0.0), (0.0031, 0.0047, 0.0023), (-0.0053, 0.0029, 0.0071))
 _OFFSET_SAMPLES = 17
+# In mm: there a double's last digit is 2e-9 mm, a fiftieth of what the kernel tells apart.
+FURTHEST_ORIGIN = 1e7
+FULL_TURN = 360.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,12 +84,90 @@ class Frame:
         """Points of the lattice's own space in the part's; shape (..., 3)."""
         return points @ self.rotation.T + self.origin
 
+    def nearest_to(self, point: Floats, cell_size: float) -> Frame:
+        """Return the frame moved by whole cells, which an endless lattice does not know, to be nearest to a point."""
+        cells = np.round(self.own(point) / cell_size)
+        return Frame(self.placed(cells * cell_size), self.rotation)
+
     def within(self, outer: Frame) -> Frame:
         """Return the frame that this one is, placed by another."""
         return Frame(outer.placed(self.origin), outer.rotation @ self.rotation)
 
 
+@dataclass(frozen=True, slots=True)
+class BoxExtent:
+    """A box in space, along the axes.
+
+    Attributes
+    ----------
+    low, high : tuple of float
+        Of its corners, in mm.
+
+    Examples
+    --------
+    >>> box = BoxExtent((0.0, 0.0, 0.0), (10.0, 10.0, 10.0))
+    >>> box.contains(np.array([[5.0, 5.0, 5.0], [5.0, 5.0, 10.5]])).tolist()
+    [True, False]
+    >>> box.near(np.array([[5.0, 5.0, 10.5]]), 1.0).tolist()
+    [True]
+    """
+
+    low: Point
+    high: Point
+
+    def contains(self, points: Floats) -> Booleans:
+        return np.asarray(self._outside(points) < 0)
+
+    def near(self, points: Floats, reach: Floats | float) -> Booleans:
+        return np.asarray(self._outside(points) <= reach)
+
+    def _outside(self, points: Floats) -> Floats:
+        """How far the points are beyond the side that they are furthest beyond, in mm; below 0 inside."""
+        return np.asarray(np.maximum(np.array(self.low) - points, points - np.array(self.high)).max(axis=-1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedExtent:
+    """An extent as it is seen from a frame of its space: asked of points of the frame's own."""
+
+    extent: Extent
+    frame: Frame
+
+    def contains(self, points: Floats) -> Booleans:
+        return self.extent.contains(self.frame.placed(points))
+
+    def near(self, points: Floats, reach: Floats | float) -> Booleans:
+        return self.extent.near(self.frame.placed(points), reach)
+
+
 AT_HOME = Frame(np.zeros(3), np.eye(3))
+
+
+def block_extent(cells: tuple[int, int, int], cell_size: float) -> BoxExtent:
+    """A block of cells, with as much round it as :data:`PERTURBATIONS` may shift the lattice by."""
+    margin = max(max(map(abs, shift)) for shift in PERTURBATIONS) * cell_size
+    x, y, z = (count * cell_size + margin for count in cells)
+    return BoxExtent((-margin, -margin, -margin), (x, y, z))
+
+
+def placement(origin: object, rotation: object) -> tuple[Point, Point]:
+    """Check where a user places a lattice: its origin in mm, and its angles about the axes in degrees.
+
+    Raises
+    ------
+    ParameterError
+    """
+    checked = []
+    for parameter, value, most, unit in (
+        ("origin", origin, FURTHEST_ORIGIN, "mm"),
+        ("rotation", rotation, FULL_TURN, "degrees"),
+    ):
+        numbers = three_numbers(parameter, value)
+        if np.abs(numbers).max() > most:
+            raise ParameterError(parameter, value, f"three numbers from -{most:,.0f} to {most:,.0f} {unit}")
+        x, y, z = numbers.tolist()
+        checked.append((x, y, z))
+    return checked[0], checked[1]
 
 
 def frame_of(origin: Point | Floats, rotation: Point | Floats) -> Frame:
@@ -132,9 +218,15 @@ def first_success(attempts: Iterable[Callable[[], T]]) -> T:
 
 
 def covering_complex(
-    low: Floats, high: Floats, frame: Frame, cell_size: float, reach: float, surface: MinimalSurface = USUAL
+    low: Floats,
+    high: Floats,
+    frame: Frame,
+    cell_size: float,
+    reach: float,
+    surface: MinimalSurface = USUAL,
+    extent: Extent | None = None,
 ) -> CellComplex:
-    """All patches that come within reach of a box in the part's space.
+    """All patches that come within reach of a box in the part's space, and of what is in it.
 
     Parameters
     ----------
@@ -146,6 +238,8 @@ def covering_complex(
     reach : float
         Half the wall or whatever else stands off the mid-surface, in mm.
     surface : MinimalSurface
+    extent : Extent, optional
+        Of the part, in the lattice's own space, if patches near its box alone are not wanted.
     """
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     own = frame.own(corners)
@@ -156,8 +250,12 @@ def covering_complex(
     centres = placements.translations / CELL_QUARTERS * cell_size
 
     def near(placement: Integers, cell: Integers) -> Booleans:
-        places = frame.placed(centres[placement] + cell * cell_size)
-        return np.asarray(np.all((places > low - margin) & (places < high + margin), axis=1))
+        own = centres[placement] + cell * cell_size
+        places = frame.placed(own)
+        in_box = np.asarray(np.all((places > low - margin) & (places < high + margin), axis=1))
+        if extent is not None:
+            in_box[in_box] = extent.near(own[in_box], margin)
+        return in_box
 
     nx, ny, nz = (last - first).tolist()
     x, y, z = first.tolist()
@@ -170,13 +268,18 @@ def _patch_radius(placements: Placements) -> float:
 
 
 def wall_extremes(low: Floats, high: Floats, frame: Frame, grading: Grading) -> tuple[float, float]:
-    """The thinnest and the thickest wall of patches that may come near a box in the part's space, in mm."""
+    """The thinnest and the thickest wall, in mm, of patches that may come near a box in the part's space.
+
+    Where the grading has an extent, only of the places where the wall may be in it.
+    """
     if grading.uniform:
         return float(grading.thickness), float(grading.thickness)  # type: ignore[arg-type]
     reach = grading.surface.tube.max_thickness / 2 * grading.cell_size
-    complex = covering_complex(low, high, frame, grading.cell_size, reach, grading.surface)
-    walls = [fitted.thickness for _, fitted in offset_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES))]
-    return min(float(some.min()) for some in walls), max(float(some.max()) for some in walls)
+    complex = covering_complex(low, high, frame, grading.cell_size, reach, grading.surface, grading.extent)
+    thinnest, thickest = np.inf, 0.0
+    for _, fitted in offset_patches(complex, grading, np.linspace(-1, 1, SIDE_SAMPLES)):
+        thinnest, thickest = grading.extremes(fitted, thinnest, thickest)
+    return thinnest, thickest
 
 
 def patch_sides(

@@ -7,6 +7,7 @@ s carries a point p to s(p) p, the paper's variable bounding-cell length; then t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,36 @@ from gyroid_cad.fields.field import Field, evaluated, given_as
 from gyroid_cad.maps.space import OPEN, SpaceMap, carried, differences
 from gyroid_cad.surface.families import USUAL, MinimalSurface
 
-__all__ = ["THINNEST_WALL", "Grading", "WallPoints"]
+__all__ = ["LARGEST_CELL", "SMALLEST_CELL", "THINNEST_WALL", "Extent", "Grading", "WallPoints"]
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 # Of differences, in cell sizes: their error, about its square, is far below any fit's; the rounding they amplify, which
 # neighbouring patches do not share, stays near 1e-12.
 _STEP = 2e-4
 # In mm. The kernel takes lengths under 1e-7 mm for nothing; this keeps every wall well above.
 THINNEST_WALL = 1e-4
+# In mm, before and after a scale. The kernel takes lengths under 1e-7 mm for nothing; these keep every edge well above.
+SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
+# How far below zero a wall goes on beyond the part as it comes, and how far then at most, in parts of the thickest, or
+# densest, there may be.
+_AS_IT_COMES, _AT_MOST = 0.1, 0.4
+
+
+class Extent(Protocol):
+    """Space that is to be filled."""
+
+    def contains(self, points: Floats) -> Booleans:
+        """Mask of the points, shape (n, 3), that lie inside; shape (n,)."""
+
+    def near(self, points: Floats, reach: Floats | float) -> Booleans:
+        """Mask of the points that lie inside or within a reach of it, in mm; it may hold some a little further off."""
+
+
+# Of places that may or may not be wanted, so many are asked for at first.
+_ASKED_FIRST = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +86,9 @@ class Grading:
     map : SpaceMap, optional
     surface : MinimalSurface
         Whose tube formula it goes by.
+    extent : Extent, optional
+        Where the wall is wanted, in the lattice's own flat space; everywhere if left out. Beyond, what is asked for
+        goes on as it comes, be it below zero, so that patches which reach out of the extent are smooth all over.
     """
 
     cell_size: float
@@ -72,6 +97,7 @@ class Grading:
     scale_field: float | Field | None = None
     map: SpaceMap | None = None
     surface: MinimalSurface = USUAL
+    extent: Extent | None = None
 
     @property
     def uniform(self) -> bool:
@@ -161,12 +187,22 @@ class Grading:
         def scale(points: Floats) -> Floats:
             return _values(name, self.scale_field, points.T)
 
-        factor, slope = scale(places), differences(scale, places, _STEP * self.cell_size)
+        factor = scale(places)
         _require(name, factor, places.T, 0.0, "above", "everywhere in the lattice")
+        self._require_scaled_cells(name, factor, places.T)
+        slope = differences(scale, places, _STEP * self.cell_size)
         jacobian = places[:, np.newaxis] * slope
         for axis in range(3):
             jacobian[axis, axis] += factor
         return factor * places, jacobian
+
+    def _require_scaled_cells(self, name: str, factor: Floats, points: Floats) -> None:
+        least, most = SMALLEST_CELL / self.cell_size, LARGEST_CELL / self.cell_size
+        worst = int(np.argmax(factor))
+        if factor[worst] > most:
+            reason = f"where cells are {LARGEST_CELL:g} mm large"
+            raise SelfIntersectionError(name, float(factor[worst]), _place(points, worst), most, reason, "at most")
+        _require(name, factor, points, least, "at least", f"where cells are {SMALLEST_CELL:g} mm small")
 
     def requested(self, points: Floats) -> Floats:
         """The thickness in mm, or the density, asked for at points of the lattice's own space; shape (n,).
@@ -175,21 +211,87 @@ class Grading:
         ------
         ParameterError
         SelfIntersectionError
-            If it is not positive everywhere, or a density past the largest.
+            If it is not positive wherever the wall is wanted, or a density past the largest.
         """
         value = self.thickness if self.density is None else self.density
         parameter = given_as("thickness" if self.density is None else "density", value)
         values = _values(parameter, value, points)
+        tube = self.surface.tube
         if self.density is None:
-            _require(parameter, values, points, THINNEST_WALL, "at least", "the thinnest wall", unit=" mm")
-            return values
-        _require(parameter, values, points, 0.0, "above", "everywhere in the lattice")
-        worst = int(np.argmax(values))
-        largest = self.surface.tube.max_density
-        if values[worst] >= largest:
+            low = self._wanted(values < THINNEST_WALL, points)
+            _require(parameter, values[low], points[low], THINNEST_WALL, "at least", "the thinnest wall", unit=" mm")
+            return self._going_on(values, tube.max_thickness * self.cell_size)
+        low = self._wanted(values <= 0, points)
+        _require(parameter, values[low], points[low], 0.0, "above", "everywhere in the lattice")
+        # A wall beyond the extent may still come into it.
+        high = self._wanted(values >= tube.max_density, points, tube.max_thickness / 2 * self.cell_size)
+        if len(high):
+            worst = int(high[np.argmax(values[high])])
             reason = "the density at which the wall meets itself"
-            raise SelfIntersectionError(parameter, float(values[worst]), _place(points, worst), largest, reason)
-        return values
+            raise SelfIntersectionError(
+                parameter, float(values[worst]), _place(points, worst), tube.max_density, reason
+            )
+        return self._going_on(values, tube.max_density)
+
+    def wanted(self, bad: Booleans, points: Floats, reach: Floats | float = 0.0) -> Booleans:
+        """Mask of those bad places at which a wall that reaches so far, in mm, is wanted; shape (n,).
+
+        Parameters
+        ----------
+        bad : ndarray of bool, shape (n,)
+        points : ndarray, shape (n, 3)
+            In the lattice's own flat space.
+        reach : float or ndarray, shape (n,)
+            Nothing by itself: then places are told closely, else the extent may seem a little larger.
+        """
+        found = bad.copy()
+        if self.extent is not None and bad.any():
+            if np.ndim(reach):
+                found[bad] = self.extent.near(points[bad], np.asarray(reach)[bad])
+            else:
+                found[bad] = self.extent.near(points[bad], reach) if reach else self.extent.contains(points[bad])
+        return found
+
+    def extremes(self, fitted: WallPoints, thinnest: float, thickest: float) -> tuple[float, float]:
+        """The thinnest and the thickest wall so far, in mm, and at more points where it is wanted."""
+        points, thickness = fitted.points, fitted.thickness
+        return -self.largest(-thickness, -thinnest, points), self.largest(thickness, thickest, points, thickness / 2)
+
+    def largest(self, values: Floats, so_far: float, points: Floats, reach: Floats | float = 0.0) -> float:
+        """The largest of some values, and of those so far, where a wall that reaches so far is wanted.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+        so_far : float
+        points, reach
+            As of :meth:`wanted`.
+        """
+        larger = np.flatnonzero(~(values <= so_far))
+        if not len(larger):
+            return so_far
+        # From the largest down, for one place where it is wanted is enough.
+        larger = larger[np.argsort(-values[larger], kind="stable")]
+        asked, many = 0, _ASKED_FIRST
+        while asked < len(larger):
+            some = larger[asked : asked + many]
+            reaches = np.asarray(reach)[some] if np.ndim(reach) else reach
+            found = self._wanted(np.ones(len(some), dtype=bool), points[some], reaches)
+            if len(found):
+                return float(values[some[found[0]]])
+            asked, many = asked + many, 4 * many
+        return so_far
+
+    def _wanted(self, bad: Booleans, points: Floats, reach: Floats | float = 0.0) -> Integers:
+        return np.flatnonzero(self.wanted(bad, points, reach))
+
+    def _going_on(self, values: Floats, largest: float) -> Floats:
+        """The values, and beyond the extent such as are no worse than a wall that is turned inside out a little."""
+        if self.extent is None:
+            return values
+        least, more = -_AS_IT_COMES * largest, _AT_MOST * largest
+        below = least - more * np.tanh((least - np.minimum(values, least)) / more)
+        return np.asarray(np.where(values < least, below, np.minimum(values, largest)))
 
     def _thickness(self, points: Floats, spacing: Floats | float) -> Floats:
         requested = self.requested(points)
@@ -198,7 +300,9 @@ class Grading:
         # The wall is stretched with the space across it, as if it had been mapped itself: so the volume
         # fraction is kept, to first order in the thickness, however the map stretches.
         thickness = np.asarray(self.surface.tube.thickness(requested) * self.cell_size * spacing)
-        _require("density", thickness, points, THINNEST_WALL, "at least", "the thinnest wall", "thickness", " mm")
+        low = self._wanted(~(thickness >= THINNEST_WALL), points)
+        name = given_as("density", self.density)
+        _require(name, thickness[low], points[low], THINNEST_WALL, "at least", "the thinnest wall", "thickness", " mm")
         return thickness
 
 
@@ -233,6 +337,8 @@ def _require(
     unit: str = "",
 ) -> None:
     """Refuse values that are not "above", or not "at least", a limit everywhere."""
+    if not len(values):
+        return
     worst = int(np.argmin(values))
     if not (values[worst] > limit or (accepted == "at least" and values[worst] == limit)):
         place = _place(points, worst)

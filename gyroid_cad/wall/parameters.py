@@ -12,7 +12,7 @@ from typing import Self
 from numpy.typing import ArrayLike
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.checks import finite_number, positive_number, three_numbers
+from gyroid_cad.common.checks import finite_number, positive_number
 from gyroid_cad.common.choices import TRIMS, SurfaceName, Trim
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
@@ -23,9 +23,10 @@ from gyroid_cad.surface.families import MinimalSurface, TubeLaw, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.covering import block_extent, placement
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
 from gyroid_cad.wall.fitted import HOME, LatticeSpec
-from gyroid_cad.wall.grading import THINNEST_WALL, Grading
+from gyroid_cad.wall.grading import LARGEST_CELL, SMALLEST_CELL, THINNEST_WALL, Grading
 
 __all__ = [
     "USUAL_TOLERANCE",
@@ -40,8 +41,6 @@ __all__ = [
     "whole_cells",
 ]
 
-# In mm. The kernel takes lengths under 1e-7 mm for nothing; these keep every edge well above.
-SMALLEST_CELL, LARGEST_CELL = 1e-2, 1e5
 MOST_CELLS_ALONG = 1_000_000
 
 
@@ -189,9 +188,8 @@ class LatticeParameters:
         if self.map is not None:
             object.__setattr__(self, "map", as_map(self.map))
         surface_named(self.surface)
-        for name in ("origin", "rotation"):
-            x, y, z = three_numbers(name, getattr(self, name)).tolist()
-            object.__setattr__(self, name, (x, y, z))
+        for name, placed in zip(("origin", "rotation"), placement(self.origin, self.rotation), strict=True):
+            object.__setattr__(self, name, placed)
         self._require_fit()
         self._require_trim()
         if not self.uniform:
@@ -312,6 +310,8 @@ class LatticeParameters:
             self.scale_field,  # type: ignore[arg-type]
             space,
             self.minimal_surface,
+            # Patches reach out of a block that is cut from them: there nothing is asked of the wall.
+            None if self.trim is None else block_extent(self.cells, self.cell_size),
         )
 
     def _measures(self) -> ExactMeasures:

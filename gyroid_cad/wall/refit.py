@@ -31,6 +31,8 @@ Integers = NDArray[np.int64]
 
 # The wall may be off by so many times the tolerance, relative to itself.
 WALL_PER_TOLERANCE = 5.0
+# In mm. Of thinner walls the error counts as if they were this thick: a hundred thousandth of a mm is no error.
+_LEAST_WALL_TOLD = 0.02
 _CHECKS_PER_SPAN = 2
 _TRIED_PATCHES = 32
 _LARGEST_EXCESS_TRUSTED = 16.0
@@ -50,7 +52,7 @@ class Refit:
     max_deviation : float
         In mm, of both faces from the exact ones, along their normals.
     max_wall_error : float
-        Relative, of the distance between the faces along the exact normal.
+        Relative, of the distance between the faces along the exact normal; to 0.02 mm of thinner walls.
     max_normal_angle : float
         In degrees, between the normals of the fitted and of the exact mid-surface.
     min_thickness, max_thickness : float
@@ -176,23 +178,22 @@ def measured(nets: Floats, complex: CellComplex, grading: Grading, patches: Inte
     knots, weights = uniform_knots(n), np.ones((n, n))
     samples = np.linspace(-1, 1, _CHECKS_PER_SPAN * (n - DEGREE) + 1)
     worst = np.zeros(3)
-    min_thickness, max_thickness = np.inf, 0.0
+    thinnest, thickest = np.inf, 0.0
     for some, fitted in offset_patches(complex, grading, samples, patches):
         met, du, dv, across = met_along_normals(nets[some], weights, knots, samples, fitted)
         shape = (len(met), len(samples), len(samples))
         thickness, normal = fitted.thickness.reshape(shape), fitted.normals.reshape(*shape, 3)
         # From the exact faces, along the fitted faces' own normals.
         off = met - np.stack([-thickness / 2, thickness / 2], axis=1)
-        distance = off * dot(unit(across), normal[:, np.newaxis])
+        distance = np.abs(off * dot(unit(across), normal[:, np.newaxis])).max(axis=1)
         middle = unit(np.cross(du.sum(axis=1), dv.sum(axis=1)))
         sine = np.linalg.norm(np.cross(middle, normal), axis=-1)
-        worst = np.maximum(worst, [_largest(distance), _largest((off[:, 1] - off[:, 0]) / thickness), _largest(sine)])
-        min_thickness, max_thickness = (
-            min(min_thickness, float(thickness.min())),
-            max(max_thickness, float(thickness.max())),
-        )
+        wall_error = np.abs(off[:, 1] - off[:, 0]) / np.maximum(np.abs(thickness), _LEAST_WALL_TOLD)
+        for index, values in enumerate((distance, wall_error, sine)):
+            worst[index] = grading.largest(values.ravel(), worst[index], fitted.points, np.abs(fitted.thickness) / 2)
+        thinnest, thickest = grading.extremes(fitted, thinnest, thickest)
     angle = float(np.degrees(np.arcsin(min(worst[2], 1.0))))
-    return Refit(n, float(worst[0]), float(worst[1]), angle, min_thickness, max_thickness, len(samples))
+    return Refit(n, float(worst[0]), float(worst[1]), angle, thinnest, thickest, len(samples))
 
 
 @lru_cache(maxsize=16)
@@ -230,7 +231,3 @@ def _require_shared_edges(wall: Wall, cell_size: float) -> None:
             f"the edges of neighbouring patches are {gaps[worst]:.2g} mm apart near ({place}) mm of the part: "
             "thickness, density, scale_field and map must be continuous, and the same at both ends that a map joins"
         )
-
-
-def _largest(values: Floats) -> float:
-    return float(np.max(np.abs(values)))

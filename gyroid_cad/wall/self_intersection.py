@@ -84,33 +84,46 @@ def require_simple(complex: CellComplex, grading: Grading) -> None:
         shape = (-1, FOLD_SAMPLES, FOLD_SAMPLES)
         middle, normal = fitted.points.reshape(*shape, 3), fitted.normals.reshape(*shape, 3)
         reach = (fitted.thickness / 2).reshape(shape)[..., np.newaxis]
-        found.append(_nearest_to_folding(nodes, middle, normal, reach, some.start))
+        found.append(_nearest_to_folding(grading, nodes, middle, normal, reach, some.start))
         middles.append(middle[:, ::2, ::2].reshape(-1, 3))
         halves.append((reach * normal)[:, ::2, ::2].reshape(-1, 3))
-    meeting = _meeting(complex, nodes[::2], np.concatenate(middles), np.concatenate(halves))
+    meeting = _meeting(complex, grading, nodes[::2], np.concatenate(middles), np.concatenate(halves))
     worst = min([*found, *meeting], key=lambda place: place.factor)
     if not worst.factor > 1:
         raise _too_thick(complex, grading, worst)
 
 
-def _nearest_to_folding(nodes: Floats, middle: Floats, normal: Floats, reach: Floats, first: int) -> _Worst:
+def _nearest_to_folding(
+    grading: Grading, nodes: Floats, middle: Floats, normal: Floats, reach: Floats, first: int
+) -> _Worst:
     """The place of some patches where the wall comes nearest to folding over."""
-    factor = _exact_fold_factor(nodes, nodes, middle, normal, reach).reshape(len(middle), -1)
+    factor = _where_wanted(grading, *_exact_fold_factor(nodes, nodes, middle, normal, reach))
     patch = int(np.argmin(factor.min(axis=1)))
     worst = _Worst(float(factor[patch].min()), first + patch, int(np.argmin(factor[patch])), nodes, _FOLDS)
     near = np.flatnonzero(factor.min(axis=1) < _NEAR_FOLDING)
     fine = np.linspace(-1, 1, _FINE_SAMPLES)
     for patch in near.tolist():
         # One patch at a time: they are few, and 65 x 65 places are many.
-        closer = _exact_fold_factor(nodes, fine, *(a[patch : patch + 1] for a in (middle, normal, reach))).ravel()
+        few = (a[patch : patch + 1] for a in (middle, normal, reach))
+        closer = _where_wanted(grading, *_exact_fold_factor(nodes, fine, *few))[0]
         index = int(np.argmin(closer))
         if closer[index] < worst.factor:
             worst = _Worst(float(closer[index]), first + patch, index, fine, _FOLDS)
     return worst
 
 
-def _exact_fold_factor(nodes: Floats, places: Floats, middle: Floats, normal: Floats, reach: Floats) -> Floats:
-    """Fold factors at a grid of places, from the polynomials through values at the nodes."""
+def _where_wanted(grading: Grading, factor: Floats, middle: Floats, half: Floats) -> Floats:
+    """Factors of patches on a grid, infinite where they fail and no wall is wanted; shape (patches, m * m)."""
+    if grading.extent is None:
+        return factor.reshape(len(factor), -1)
+    bad = grading.wanted(factor.ravel() <= 1, middle.reshape(-1, 3), np.linalg.norm(half, axis=-1).ravel())
+    return np.where((factor.ravel() > 1) | bad, factor.ravel(), np.inf).reshape(len(factor), -1)
+
+
+def _exact_fold_factor(
+    nodes: Floats, places: Floats, middle: Floats, normal: Floats, reach: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Fold factors at a grid of places, the places and half walls, from the polynomials through values at the nodes."""
     values, rate = interpolation_matrix(nodes, places), differentiation_matrix(nodes)
     slope = values @ rate
 
@@ -124,7 +137,8 @@ def _exact_fold_factor(nodes: Floats, places: Floats, middle: Floats, normal: Fl
     middle_u, normal_u = (at_places(slope, values, a) for a in (middle, normal))
     middle_v, normal_v = (at_places(values, slope, a) for a in (middle, normal))
     through = at_places(values, values, normal)
-    return first_fold(*layer_areas((middle_u, middle_v), (half * normal_u, half * normal_v), through))
+    factor = first_fold(*layer_areas((middle_u, middle_v), (half * normal_u, half * normal_v), through))
+    return factor, at_places(values, values, middle), half
 
 
 def require_simple_fit(wall: Wall, grading: Grading) -> None:
@@ -145,25 +159,28 @@ def require_simple_fit(wall: Wall, grading: Grading) -> None:
     reason = f"where the fit with {len(wall.weights)} control points a side folds over"
     worst = _Worst(np.inf, 0, 0, coarse, reason)
     for first in range(0, len(wall.nets), _PATCHES_AT_ONCE):
-        factor = _fitted_fold_factor(wall, slice(first, first + _PATCHES_AT_ONCE), coarse)
+        some = slice(first, first + _PATCHES_AT_ONCE)
+        factor = _where_wanted(grading, *_fitted_fold_factor(wall, some, coarse))
         for patch in (first + np.flatnonzero(factor.min(axis=1) < _NEAR_FOLDING)).tolist():
-            closer = _fitted_fold_factor(wall, slice(patch, patch + 1), fine)[0]
+            closer = _where_wanted(grading, *_fitted_fold_factor(wall, slice(patch, patch + 1), fine))[0]
             if closer.min() < worst.factor:
                 worst = _Worst(float(closer.min()), patch, int(np.argmin(closer)), fine, reason)
     if not worst.factor > 1:
         raise _too_thick(wall.complex, grading, worst)
 
 
-def _fitted_fold_factor(wall: Wall, some: slice, samples: Floats) -> Floats:
-    """Fold factors of some fitted patches at a grid of samples; shape (patches, samples * samples)."""
+def _fitted_fold_factor(wall: Wall, some: slice, samples: Floats) -> tuple[Floats, Floats, Floats]:
+    """Fold factors of some fitted patches at a grid of samples; the places, and half walls."""
     knots = (wall.knots, wall.knots)
     below, above = np.moveaxis(wall.nets[some], 1, 0)
-    _, middle_u, middle_v = grid_derivatives((above + below) / 2, wall.weights, knots, samples, samples)
+    middle, middle_u, middle_v = grid_derivatives((above + below) / 2, wall.weights, knots, samples, samples)
     half, half_u, half_v = grid_derivatives((above - below) / 2, wall.weights, knots, samples, samples)
-    return first_fold(*layer_areas((middle_u, middle_v), (half_u, half_v), half)).reshape(len(below), -1)
+    # Beyond an extent the wall may be turned inside out: then this is not the way from face to face.
+    through = np.cross(middle_u, middle_v)
+    return first_fold(*layer_areas((middle_u, middle_v), (half_u, half_v), through)), middle, half
 
 
-def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats) -> list[_Worst]:
+def _meeting(complex: CellComplex, grading: Grading, samples: Floats, middle: Floats, half: Floats) -> list[_Worst]:
     """Places where walls meet others most, if they do."""
     from scipy.spatial import cKDTree
 
@@ -180,7 +197,9 @@ def _meeting(complex: CellComplex, samples: Floats, middle: Floats, half: Floats
         found.append(met)
         found += [lookup.met(beyond, side * part * half[beyond])[0] for part in _ALONG_THE_WALL]
     worst = []
-    for where, factor in found:
+    for places, factors in found:
+        wanted = grading.wanted(np.ones(len(places), dtype=bool), middle[places], reach[places])
+        where, factor = places[wanted], factors[wanted]
         if len(where):
             place = int(np.argmin(factor))
             at = divmod(int(where[place]), CLEARANCE_SAMPLES**2)

@@ -117,10 +117,10 @@ def splitting(folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]
     end, workers = time.monotonic() + PATIENCE, []
     while run.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
-        # What reads the part is a program of its own, and is there before, or about to end.
+        # What reads the part is alone, and is there before.
         with suppress(psutil.Error):
             workers = [child for child in psutil.Process(run.pid).children() if "fill" in child.cmdline()]
-            if workers:
+            if len(workers) > 1:
                 return run, workers
     run.kill()
     run.communicate()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -146,6 +147,26 @@ def test_a_number_of_thousands_of_digits_is_one_short_line(capsys: Captured, opt
     assert failed.status == 2
     assert option in failed.err
     assert len(failed.err) < 400
+
+
+@pytest.mark.parametrize("command", ["build", "mesh", "volumes", "view", "report", "print-check"])
+@pytest.mark.parametrize(
+    "option",
+    ["--scale-field=1e300", "--scale-field=1e300*(1+x*x)", "--map=cylinder:radius=1e300", "--map=twist:angle=1e300"],
+)
+def test_numbers_beyond_all_measure_are_one_line_of_the_option(
+    capsys: Captured, tmp_path: Path, command: str, option: str
+) -> None:
+    output = {"build": "a.step", "mesh": "a.vtu", "volumes": "a.xml", "view": "a.png", "report": "a.html"}.get(command)
+    written = [] if output is None else ["-o", tmp_path / output]
+    more = ["--subdivisions", "2"] if command == "mesh" else []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        failed = run(capsys, command, *LATTICE, *more, *written, option)
+    assert failed.status == 2
+    assert failed.err.startswith(f"gyroid-cad: error: {option.partition('=')[0]} ")
+    assert failed.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_a_word_too_much_the_program_says_it_too(tmp_path: Path) -> None:

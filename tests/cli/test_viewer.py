@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -72,15 +71,13 @@ def test_an_assembly_is_shown_in_the_papers_colours(lattice: Lattice, tmp_path: 
 def test_an_assembly_of_many_looks_like_the_solid_and_its_part_is_meshed_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lattice = Lattice((5, 4, 3), 10.0, 0.8, fit=COARSE)
+    lattice = Lattice((2, 2, 1), 10.0, 0.8, fit=COARSE)
     lattice.write(tmp_path / "many.step", instances=True)
     meshed: list[object] = []
     facets_of_shape = viewer.facets_of_shape
     monkeypatch.setattr(viewer, "facets_of_shape", lambda *some: meshed.append(some) or facets_of_shape(*some))
-    start = time.process_time()
     view(tmp_path / "many.step", tmp_path / "many.png")
-    # Two minutes for a thousand cells are seven seconds for these; it takes less than two.
-    assert time.process_time() - start < 5
+    # Meshing each place by itself took two minutes for a thousand cells.
     assert len(meshed) == 1
     view(lattice, tmp_path / "whole.png")
     assert agreement(covered(tmp_path / "many.png"), covered(tmp_path / "whole.png")) > 0.98
@@ -111,14 +108,12 @@ def test_a_file_may_name_its_picture(tmp_path: Path) -> None:
 
 
 def test_a_picture_takes_neither_a_display_nor_vtk(tmp_path: Path) -> None:
-    run = program("view", *ONE_CELL, "-o", str(tmp_path / "cell.png"))
+    loaded = (
+        "import sys; from gyroid_cad.cli.app import main; sys.exit(main(sys.argv[1:]) or 'vtkmodules' in sys.modules)"
+    )
+    run = program("-c", loaded, "view", *ONE_CELL, "-o", str(tmp_path / "cell.png"))
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
     assert covered(tmp_path / "cell.png").any()
-    loaded = (
-        "import sys; from gyroid_cad.cli.app import main; main(sys.argv[1:]); sys.exit('vtkmodules' in sys.modules)"
-    )
-    command = [sys.executable, "-c", loaded, "view", *ONE_CELL, "-o", str(tmp_path / "cell.png")]
-    assert subprocess.run(command, check=False).returncode == 0
 
 
 def test_a_picture_that_failed_leaves_the_older_one(
@@ -140,10 +135,11 @@ def test_a_picture_that_failed_leaves_the_older_one(
 
 
 def program(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """The real program, with no display but what is given."""
+    """Python, with no display but what is given."""
     without = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-m", "gyroid_cad", *arguments]
-    return subprocess.run(command, env={**without, **environment}, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, *arguments], env={**without, **environment}, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there always is a desktop")
@@ -153,7 +149,7 @@ def program(*arguments: str, **environment: str) -> subprocess.CompletedProcess[
 def test_without_a_display_a_window_is_refused_in_one_line_that_says_what_to_do(
     environment: dict[str, str], words: str
 ) -> None:
-    run = program("view", *ONE_CELL, **environment)
+    run = program("-m", "gyroid_cad", "view", *ONE_CELL, **environment)
     assert run.returncode == 1
     assert run.stdout == ""
     assert run.stderr.splitlines() == [

@@ -19,13 +19,15 @@ from numpy.testing import assert_array_equal
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.expressions import DEEPEST_NESTING, FUNCTIONS, LONGEST_EXPRESSION, VARIABLES, compile_expression
+from gyroid_cad.fields.makers import smooth_maximum, smooth_minimum
 
 # A column, a row and a single number: of the broadcast shape (2, 3).
 PLACE = (np.array([[-1.5], [2.0]]), np.array([0.0, 0.3, 7.0]), np.float64(-0.25))
 # What Unicode counts as forms of plain letters, and Python reads as those.
 ITALIC_X, BOLD_Y = "\N{MATHEMATICAL ITALIC SMALL X}", "\N{MATHEMATICAL BOLD SMALL Y}"
 WIDE_SIN = "".join(chr(ord(letter) + 0xFEE0) for letter in "sin")
-UNARY = [name for name in FUNCTIONS if name not in {"arctan2", "hypot", "minimum", "maximum", "clip"}]
+BLENDS = {"smooth_maximum": smooth_maximum, "smooth_minimum": smooth_minimum}
+UNARY = [name for name in FUNCTIONS if name not in {"arctan2", "hypot", "minimum", "maximum", "clip", *BLENDS}]
 
 FORBIDDEN = [
     '__import__("os")', "__import__", "x.__class__", "x.real", "x[0]", "x[0:1]", "x if x else y", "(x:=3)", "f'{x}'",
@@ -52,7 +54,7 @@ class Quantity(NDArrayOperatorsMixin):
 
 
 PYTHONS_NAMES: dict[str, Any] = {
-    **{name: getattr(np, name) for name in FUNCTIONS},
+    **{name: getattr(np, name) for name in FUNCTIONS if name not in BLENDS},
     **{name: Quantity(value) for name, value in zip(VARIABLES, PLACE, strict=True)},
     "clip": lambda value, low, high: np.minimum(np.maximum(value, low), high),
     "pi": Quantity(pi),
@@ -299,3 +301,22 @@ def test_expressions_of_one_text_are_equal_and_survive_pickling() -> None:
 def test_every_function_is_numpys_own() -> None:
     for name in UNARY:
         assert_array_equal(value(f"{name}(z + 0.75)"), np.broadcast_to(getattr(np, name)(0.5), (2, 3)))
+
+
+@settings(max_examples=50)
+@given(*3 * [st.floats(-5, 5)], st.floats(0.1, 3))
+@example(3.0, 5.0, 1.0, 0.5)
+def test_clip_and_the_smooth_functions_mean_what_they_do_in_python(
+    one: float, low: float, high: float, width: float
+) -> None:
+    assert_array_equal(value(f"clip({one}, {low}, {high})", 0, 0, 0), np.clip(one, low, high))
+    for name, blend in BLENDS.items():
+        by_python = blend(f"x + {one}", f"{low}*y", width)
+        assert_array_equal(value(f"{name}(x + {one}, {low}*y, {width})"), by_python(*PLACE))
+
+
+@pytest.mark.parametrize("name", BLENDS)
+@pytest.mark.parametrize("width", ["0", "-1", "x", "1/0", "0*y + 1", "sqrt(-1)"])
+def test_a_width_that_is_no_number_above_zero_is_refused_as_in_python(name: str, width: str) -> None:
+    assert f"the width {width!r} at column" in refusal(f"{name}(x, y, {width})")
+    assert compile_expression(f"{name}(x, y, pi/4)").variables == {"x", "y"}

@@ -21,7 +21,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel import region_split, regions
+from gyroid_cad.kernel import processes, region_split, regions
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part, measure, require_part
@@ -74,7 +74,7 @@ def never(point: Floats) -> bool:
 def lattice_in(part: Part) -> tuple[Faces, Faces]:
     """The lattice's faces that the part's boundary may cross, and those wholly inside."""
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
-    cloud, error = part.surface_samples(L / 12)
+    cloud, _, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
     samples = np.linspace(-1, 1, SIDE_SAMPLES)
     points = FRAME.placed(patch_points_and_normals(complex, L, samples)[0])
@@ -202,7 +202,7 @@ def test_where_no_process_can_be_started_regions_are_split_here_with_the_same_re
     if why == "one processor":
         monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     elif why == "another system":
-        monkeypatch.setattr(regions.sys, "platform", "darwin")
+        monkeypatch.setattr(processes.sys, "platform", "darwin")
     else:
         monkeypatch.setattr(regions.multiprocessing.current_process(), "daemon", True, raising=False)
     told: list[tuple[int, int]] = []

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -109,7 +111,7 @@ def filled(name: str) -> tuple[Part, Hollow, TopoDS_Shape, TopoDS_Shape]:
     part, made = parted(*{"ball": (ball(),), "box": (box(), SKIN, [">Z"])}[name])
     core = made.core
     complex = covering_complex(core.low, core.high, FRAME, CELL, WALL / 2)
-    cloud, error = core.surface_samples(CELL / 12)
+    cloud, _, error = core.surface_samples(CELL / 12)
     tree = cKDTree(cloud)
     samples = np.linspace(-1, 1, SIDE_SAMPLES)
     points = FRAME.placed(patch_points_and_normals(complex, CELL, samples)[0])
@@ -253,9 +255,23 @@ def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatc
         parted(box())
 
 
-@pytest.mark.parametrize("fault", ["import os; os.abort()", "import time; time.sleep(60)", "raise SystemExit"])
-def test_a_way_that_crashes_or_does_not_end_gives_nothing(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
-    monkeypatch.setattr(gyroid_cad.kernel.offset, "_WORK", fault)
+def crashes(*arguments: str) -> None:
+    os.abort()
+
+
+def does_not_end(*arguments: str) -> None:
+    time.sleep(60)
+
+
+def ends_too_soon(*arguments: str) -> None:
+    raise SystemExit
+
+
+@pytest.mark.parametrize("fault", [crashes, does_not_end, ends_too_soon])
+def test_a_way_that_crashes_or_does_not_end_gives_nothing(
+    monkeypatch: pytest.MonkeyPatch, fault: Callable[..., None]
+) -> None:
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "work", fault)
     monkeypatch.setattr(gyroid_cad.kernel.offset, "_SECONDS_AT_MOST", 0.3)
     (solid,) = require_part(wrapped(box())).solids
     assert list(offsets(solid, [], SKIN, list(CLOSED_WAYS)[:2])) == [None, None]

@@ -45,7 +45,7 @@ def filled(shape: TopoDS_Shape) -> TopoDS_Shape:
     """The part filled with the wall, by the pieces that its boundary cuts and those it leaves whole."""
     part = require_part(shape)
     complex = covering_complex(part.low, part.high, FRAME, L, THICKNESS / 2)
-    cloud, error = part.surface_samples(L / 12)
+    cloud, _, error = part.surface_samples(L / 12)
     tree = cKDTree(cloud)
     samples = np.linspace(-1, 1, SIDE_SAMPLES)
     points = FRAME.placed(patch_points_and_normals(complex, L, samples)[0])

@@ -174,7 +174,7 @@ def test_a_deviation_that_is_no_length_is_refused_and_writes_nothing(
 
 @pytest.mark.parametrize("angle", [0.0, -15.0, 90.0, nan, inf])
 def test_an_angle_no_facets_could_keep_to_is_refused(angle: float) -> None:
-    with pytest.raises(ParameterError, match=rf"angle = {angle}: expected above 0 and below 90 degrees"):
+    with pytest.raises(ParameterError, match=rf"angle = {angle}: expected 0.1 or more and below 90 degrees"):
         require_meshing(0.1, angle)
 
 

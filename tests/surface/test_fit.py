@@ -14,10 +14,19 @@ from scipy.optimize import least_squares
 
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.nurbs.basis import gauss_points
-from gyroid_cad.surface.families import USUAL
-from gyroid_cad.surface.fit import EDGE_GAP_LIMIT, FitSettings, FittedPatch, edge_gap, fit_patch, require_shared_edges
-from gyroid_cad.surface.fit_report import fit_report
+from gyroid_cad.surface.families import SURFACES, USUAL, MinimalSurface
+from gyroid_cad.surface.fit import (
+    EDGE_GAP_LIMIT,
+    FitSettings,
+    FittedPatch,
+    edge_gap,
+    error_within_reach,
+    fit_patch,
+    require_shared_edges,
+)
+from gyroid_cad.surface.fit_report import fit_report, fit_within
 from gyroid_cad.surface.patch import ROTOINVERSION, parameter_corners, smooth
+from gyroid_cad.surface.weierstrass import Family
 
 TUBE = USUAL.tube
 
@@ -113,6 +122,27 @@ def test_errors_fall_with_the_order_of_cubic_splines(measure: Callable[[FittedPa
     spans = [n - 3 for n in SIZES]
     for (coarse, fine), (few, many) in zip(pairwise(errors), pairwise(spans), strict=True):
         assert np.log(coarse / fine) / np.log(many / few) >= order
+
+
+@pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES.keys())
+def test_what_the_finest_fit_reaches_is_known_from_a_coarse_one(surface: MinimalSurface) -> None:
+    coarse, fine = (
+        error_within_reach(n, fit_report(fit_patch(FitSettings(n), surface.family)).max_distance) for n in (8, 20)
+    )
+    assert 0.5 < coarse / fine < 2
+
+
+def test_a_tolerance_out_of_reach_is_refused_before_the_finest_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[int] = []
+
+    def fit(settings: FitSettings, family: Family) -> FittedPatch:
+        tried.append(settings.control_points)
+        return fit_patch(settings, family)
+
+    monkeypatch.setattr("gyroid_cad.surface.fit_report.fit_patch", fit)
+    with pytest.raises(ParameterError, match=r"tolerance = 1e-12: expected at least about 5\.\de-09, which 40 control"):
+        fit_within(FitSettings(), 1e-12)
+    assert tried == [10]
 
 
 def test_fitted_normals_are_nearly_of_unit_length_and_perpendicular(fitted: FittedPatch) -> None:

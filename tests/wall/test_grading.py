@@ -199,7 +199,7 @@ BAD: dict[str, tuple[Grading, str, str]] = {
     "density too thin": (Grading(L, density=1e-7), "density", "at least"),
     "dense": (Grading(L, density=field("0.5 + 0.1*x")), "density", "below"),
     "negative scale": (Grading(L, 0.5, scale_field=field("1 - 0.3*x")), "scale_field", "above"),
-    "scale that folds": (Grading(L, 0.5, scale_field=field("exp(-x)")), "scale_field", "above"),
+    "scale that folds": (Grading(L, 0.5, scale_field=field("exp(-x/2)")), "scale_field", "above"),
     "mirror": (Grading(L, 0.5, map=affine(np.diag([-1, 1, 1]))), "map", "above"),
     "fold": (Grading(L, 0.5, map=SpaceMap(lambda x, y, z: ((x - 3) ** 2, y, z))), "map", "above"),
     "flat map": (Grading(L, 0.5, map=affine(np.diag([1, 1, 0]))), "map", "above"),
@@ -213,11 +213,22 @@ VALUES: dict[str, Callable[[float, float, float], float]] = {
     "dense": lambda x, y, z: 0.5 + 0.1 * x,
     "negative scale": lambda x, y, z: 1 - 0.3 * x,
     # det (s I + p grad s^T) = s^2 (s + p . grad s)
-    "scale that folds": lambda x, y, z: np.exp(-3 * x) * (1 - x),
+    "scale that folds": lambda x, y, z: np.exp(-1.5 * x) * (1 - x / 2),
     "mirror": lambda x, y, z: -1.0,
     "fold": lambda x, y, z: 2 * (x - 3),
     "flat map": lambda x, y, z: 0.0,
 }
+
+
+@pytest.mark.parametrize(("scale", "accepted", "limit"), [("1e300", "at most", 1e5), ("1e-300", "at least", 1e-2)])
+@pytest.mark.parametrize("varies", ["", " + 0*x", "*(1 + x*x)"])
+def test_cells_are_scaled_to_no_other_sizes_than_can_be_given(
+    scale: str, accepted: str, limit: float, varies: str
+) -> None:
+    with pytest.raises(SelfIntersectionError) as caught:
+        fitted(Grading(L, density=0.3, scale_field=field(f"{scale}{varies}") if varies else float(scale)))
+    assert (caught.value.parameter, caught.value.accepted) == ("scale_field", accepted)
+    assert caught.value.limit * L == pytest.approx(limit)
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -1,0 +1,154 @@
+"""Processes beside this one: where they can be forked, what ends them, and work done in one of its own."""
+
+from __future__ import annotations
+
+import faulthandler
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import StringIO
+from multiprocessing.context import ForkProcess
+from typing import Protocol
+
+__all__ = ["Started", "can_fork", "interrupts_later", "processors", "settle_in", "started"]
+
+# Of prctl(2): the signal that a process gets when the one that started it ends.
+_SET_SIGNAL_AT_PARENTS_END = 1
+
+
+class Started(Protocol):
+    """Work in a process of its own."""
+
+    def wait(self, seconds: float) -> int | None:
+        """Return the status with which the process ended; None if it is still at it after so many seconds."""
+
+    def kill(self) -> None:
+        """End the process at once, if it has not ended."""
+
+
+def started(work: Callable[..., None], *arguments: str) -> Started:
+    """Start work of the kernel in a process of its own; nothing that it prints is seen.
+
+    Forked, it begins at once; a new Python would first load the kernel, for a second or two.
+
+    Parameters
+    ----------
+    work : callable
+        A function of a module.
+    *arguments : str
+    """
+    return _Forked(work, arguments) if can_fork() else _Fresh(work, arguments)
+
+
+def can_fork() -> bool:
+    """Tell whether this process can fork others that end with it."""
+    # Elsewhere they could outlive this process; on macOS system libraries may crash in them. And a process of a pool,
+    # which ends with its parent, may have none of its own.
+    return sys.platform == "linux" and not multiprocessing.current_process().daemon
+
+
+def processors() -> int:
+    """Count the processors that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class _Forked:
+    """A copy of this process, which has all modules already."""
+
+    def __init__(self, work: Callable[..., None], arguments: tuple[str, ...]) -> None:
+        self._process = ForkProcess(target=_work_unseen, args=(os.getpid(), work, arguments), daemon=True)
+        with interrupts_later():
+            self._process.start()
+
+    def wait(self, seconds: float) -> int | None:
+        self._process.join(seconds)
+        return self._process.exitcode
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.join()
+
+
+class _Fresh:
+    """A new Python that finds the same modules."""
+
+    def __init__(self, work: Callable[..., None], arguments: tuple[str, ...]) -> None:
+        program = f"import sys; from {work.__module__} import {work.__name__} as work; work(*sys.argv[1:])"
+        paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", program, *arguments],
+            env={**os.environ, "PYTHONPATH": paths},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def wait(self, seconds: float) -> int | None:
+        try:
+            return self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+def _work_unseen(parent: int, work: Callable[..., None], arguments: tuple[str, ...]) -> None:
+    settle_in(parent)
+    # The kernel's crashes are what such a process is for, and nothing to report.
+    faulthandler.disable()
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nowhere, stream)
+    sys.stdout = sys.stderr = StringIO()
+    work(*arguments)
+
+
+def settle_in(parent: int) -> None:
+    """Make a forked process ready for its work.
+
+    A terminal interrupts all of a program's processes, and only the first has an answer; nor should the others do what
+    it answers to being ended.
+
+    Parameters
+    ----------
+    parent : int
+        The number of the process that forked it, as ``os.getpid`` gives it there.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    _end_with_parent(parent)
+
+
+def _end_with_parent(parent: int) -> None:
+    """Let the system end this process at once when its parent ends, however that ends (Linux; elsewhere nothing)."""
+    if sys.platform != "linux":
+        return
+    import ctypes  # not needed by those who never start a process
+
+    ctypes.CDLL(None).prctl(_SET_SIGNAL_AT_PARENTS_END, signal.SIGKILL)
+    # It may have ended already.
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+@contextmanager
+def interrupts_later() -> Iterator[None]:
+    """Hold interrupts back until the context ends: what comes while a process is forked, Python reports and forgets."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    if heard:
+        signal.raise_signal(signal.SIGINT)

@@ -1,0 +1,47 @@
+"""Work in a process of its own: forked where that can be, of a new Python elsewhere, and the same to those who wait."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import errands
+import pytest
+
+from gyroid_cad.kernel.processes import can_fork, started
+
+PATIENCE = 60.0
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(params=["linux", "another system"], autouse=True)
+def system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes are forked on Linux alone."""
+    if request.param == "linux" != sys.platform:
+        pytest.skip("not Linux")
+    monkeypatch.setattr(sys, "platform", request.param)
+    assert can_fork() == (request.param == "linux")
+
+
+def test_it_is_done_in_another_process_that_prints_nothing(tmp_path: Path, capfd: Captured) -> None:
+    work = started(errands.shout, str(tmp_path / "a"), "two words")
+    assert work.wait(PATIENCE) == 0
+    number, words = (tmp_path / "a").read_text().split(" ", 1)
+    assert int(number) != os.getpid()
+    assert words == "two words"
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_crash_and_an_error_are_a_status(capfd: Captured) -> None:
+    assert started(errands.crash).wait(PATIENCE) == -signal.SIGABRT
+    assert started(errands.fail).wait(PATIENCE) == 1
+    assert capfd.readouterr() == ("", "")
+
+
+def test_one_that_does_not_end_is_waited_for_as_long_as_one_likes_and_ended() -> None:
+    work = started(errands.sleep)
+    assert work.wait(0.01) is None
+    work.kill()
+    assert work.wait(PATIENCE) == -signal.SIGKILL

@@ -27,8 +27,11 @@ from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import TOLERANCE
+from gyroid_cad.kernel.surfaces import translation
 from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners
+from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.triangulation import parting
 
 __all__ = ["diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
@@ -65,15 +68,16 @@ def write_meshed_stl(
 
 def meshed(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
     """Triangles of a shape as arrays, for formats other than STL.
 
     They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
-    Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
+    Python. Corners are the same where their coordinates are, to the last bit, as in any STL. A shape so far off that
+    single precision would be too coarse there is brought near the origin for that, and the triangles back.
 
     Returns
     -------
-    vertices : ndarray of float32, shape (vertices, 3)
+    vertices : ndarray, shape (vertices, 3)
         In mm.
     triangles : ndarray of int32, shape (triangles, 3)
 
@@ -87,12 +91,12 @@ def meshed(
 
 def meshed_by_face(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+) -> tuple[NDArray[np.floating], NDArray[np.int32], NDArray[np.int64]]:
     """Triangles as :func:`meshed` makes them, and the face that each lies on, as ``TopExp_Explorer`` counts faces.
 
     Returns
     -------
-    vertices : ndarray of float32, shape (vertices, 3)
+    vertices : ndarray, shape (vertices, 3)
         In mm.
     triangles : ndarray of int32, shape (triangles, 3)
     faces : ndarray of int, shape (triangles,)
@@ -101,14 +105,24 @@ def meshed_by_face(
     ------
     ParameterError, ExportError
     """
-    copy = _meshed_copy(shape, path, deviation, angle)
+    away = _brought_near(shape, deviation)
+    copy = _meshed_copy(shape if away is None else shape.Moved(translation((-away).tolist())), path, deviation, angle)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "triangles.stl"
         _write(copy, file, path)
         vertices, triangles, kept = numbered_corners(binary_stl_corners(file))
     # The kernel writes them face by face.
     counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
-    return vertices, triangles.astype(np.int32), np.repeat(np.arange(len(counts)), counts)[kept]
+    faces = np.repeat(np.arange(len(counts)), counts)[kept]
+    return vertices if away is None else vertices + away, triangles.astype(np.int32), faces
+
+
+def _brought_near(shape: TopoDS_Shape, deviation: float) -> Floats | None:
+    """Middle of a shape that stands too far off for single precision; None of one that does not."""
+    low, high = corners_of(box_round([shape]))
+    if not is_coarse(float(np.abs([low, high]).max()), float(np.linalg.norm(high - low)), deviation):
+        return None
+    return np.asarray(low + high) / 2
 
 
 def _triangle_count(face: TopoDS_Shape) -> int:

@@ -29,6 +29,7 @@ from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
 from gyroid_cad.mesh.iga.patches import VolumePatches
+from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
 from gyroid_cad.wall.fitted import FittedWall, fitted_wall
@@ -203,6 +204,9 @@ class Lattice(LatticeParameters, HostShapes):
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
         require_settings(self.cells, schema, deviation, angle, solid=bool(solid))
+        for path in targets:
+            if format_of(path) in TRIANGLE_FORMATS:
+                require_near_origin(path, self.fitted(progress).bounding_box(), self._deviation(deviation))
         if solid:
             built = self.built(progress)
             built.write(solid, schema, self._deviation(deviation), angle, progress)

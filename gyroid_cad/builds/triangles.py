@@ -13,7 +13,7 @@ from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.stl import write_stl
+from gyroid_cad.mesh.triangles.stl import require_near_origin, write_stl
 from gyroid_cad.mesh.triangles.three_mf import write_3mf
 from gyroid_cad.mesh.triangles.triangulation import triangulated
 from gyroid_cad.wall.areas import fitted_areas
@@ -56,10 +56,13 @@ class Triangles:
         Raises
         ------
         ParameterError
-            If a file cannot count so many triangles, or memory would not do for 3MF.
+            If a file cannot count so many triangles, memory would not do for 3MF, or the lattice is too far off for
+            single precision.
         ExportError
         """
         targets = require_formats(paths, TRIANGLE_FORMATS)
+        for path in targets:
+            require_near_origin(path, self.fitted.bounding_box(), self.triangulation.deviation)
         if any(format_of(path) is THREE_MF for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count

@@ -25,10 +25,12 @@ from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, grams_of, regions_of, skin_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part, selected_faces
 from gyroid_cad.kernel.skin import Hollow, hollow
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
@@ -197,9 +199,10 @@ class Filled(HostShapes):
         targets = require_formats(paths)
         limit = self.deviation(deviation)
         require_settings((1, 1, 1), schema, limit, angle)
-        for path in targets:
-            if not self.report.closed and format_of(path) in TRIANGLE_FORMATS:
+        for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
+            if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
+            require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
                 write_shape(self.solid(), path, schema, limit, angle, cut=True)

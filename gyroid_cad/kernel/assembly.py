@@ -97,7 +97,7 @@ def write_assembly(
     ParameterError, ExportError
     """
     product = product_name(path, name)
-    with step_of_kernel(path, schema, product) as raw:
+    with step_of_kernel(part.shape, path, schema, product) as raw:
         document = new_document()
         _fill(document, part, places, product)
         writer = STEPCAFControl_Writer()

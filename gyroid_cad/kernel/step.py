@@ -26,9 +26,19 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.check import Topology, topology
 from gyroid_cad.version import __version__
 
-__all__ = ["compact_step", "fill_header", "no_messages", "product_name", "read_step", "step_of_kernel", "write_step"]
+__all__ = [
+    "compact_step",
+    "fill_header",
+    "no_messages",
+    "product_name",
+    "read_step",
+    "step_of_kernel",
+    "topology_in_step",
+    "write_step",
+]
 
 # 5e-11 of a coordinate, under 1e-8 mm for parts below 200 mm: a tenth of the kernel's tolerance.
 _SIGNIFICANT_DIGITS = 10
@@ -38,6 +48,9 @@ _NOISE_DECIMALS = 12
 _POINT = re.compile(r"#(\d+) = CARTESIAN_POINT\('',\(([^()]*)\)\s*\);")
 _REFERENCE = re.compile(r"#(\d+)")
 _SPLINE = "B_SPLINE_"
+_KIND = re.compile(r"#\d+\s*=\s*(\w+)\s*\(")
+_USE = re.compile(r"#\d+\s*=\s*ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+)")
+_COUNTED = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "ADVANCED_FACE", "FACE_SURFACE")
 
 
 def compact_step(source: Path, target: Path) -> None:
@@ -53,6 +66,38 @@ def compact_step(source: Path, target: Path) -> None:
     points = _Points(source)
     with source.open(encoding="utf-8") as lines, target.open("w", encoding="utf-8", newline="\n") as out:
         out.writelines(_rewritten(entity, points) for entity in _entities(lines))
+
+
+def topology_in_step(path: str | os.PathLike[str]) -> Topology:
+    """Count the solids, faces and edges that are not used twice in the text of a STEP file, whoever wrote it.
+
+    No kernel is asked, so that what its writer left out is seen. A face is an ``ADVANCED_FACE`` (ISO 10303-511),
+    and an edge is used by each ``ORIENTED_EDGE`` that names it.
+    """
+    counts = dict.fromkeys(_COUNTED, 0)
+    uses: dict[str, int] = {}
+    with open(path, encoding="utf-8", errors="replace") as lines:
+        for entity in _entities(lines):
+            if use := _USE.match(entity):
+                uses[use[1]] = uses.get(use[1], 0) + 1
+            elif (kind := _KIND.match(entity)) and kind[1] in counts:
+                counts[kind[1]] += 1
+    return Topology(
+        solids=counts["MANIFOLD_SOLID_BREP"] + counts["BREP_WITH_VOIDS"],
+        faces=counts["ADVANCED_FACE"] + counts["FACE_SURFACE"],
+        open_edges=sum(count != 2 for count in uses.values()),
+    )
+
+
+def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Shape) -> None:
+    """Refuse a file that does not hold all of a shape, or not as closed."""
+    wanted, found = topology(shape), topology_in_step(written)
+    whole = (found.solids, found.faces) == (wanted.solids, wanted.faces)
+    if not whole or found.open_edges > wanted.open_edges:
+        raise ExportError(
+            f"{path} was not written: the kernel's STEP writer gave {found.solids} of {wanted.solids} solids, "
+            f"{found.faces} of {wanted.faces} faces and {found.open_edges} open edges; BREP holds the shape as it is"
+        )
 
 
 def _entities(lines: TextIO) -> Iterator[str]:
@@ -153,7 +198,7 @@ def write_step(
     ParameterError, ExportError
     """
     product = product_name(path, name)
-    with step_of_kernel(path, schema, product, parameter_curves) as raw:
+    with step_of_kernel(shape, path, schema, product, parameter_curves) as raw:
         writer = STEPControl_Writer()
         if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
             raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
@@ -165,14 +210,16 @@ def write_step(
 
 @contextmanager
 def step_of_kernel(
-    path: str | os.PathLike[str], schema: Schema, product: str, parameter_curves: bool = False
+    shape: TopoDS_Shape, path: str | os.PathLike[str], schema: Schema, product: str, parameter_curves: bool = False
 ) -> Iterator[Path]:
-    """Give a name for what the kernel's writer writes; what is there at the end is made compact and moved into place.
+    """Give a name for what the kernel's writer writes; what is there is made compact, looked at and moved into place.
 
     The kernel's settings are global to the process, and count when a writer makes its model: they hold inside.
 
     Parameters
     ----------
+    shape : TopoDS_Shape
+        That the file is to hold, once.
     path : path-like
     schema : {"ap214", "ap242"}
     product : str
@@ -198,6 +245,7 @@ def step_of_kernel(
         try:
             yield raw
             compact_step(raw, temporary)
+            _require_whole(path, temporary, shape)
         finally:
             raw.unlink(missing_ok=True)
 

@@ -27,13 +27,20 @@ from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import TOLERANCE
-from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners
+from gyroid_cad.kernel.surfaces import translation
+from gyroid_cad.mesh.triangles.files import binary_stl_corners, keep_facets, numbered_corners
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
+from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.triangulation import parting
 
-__all__ = ["diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
+__all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
+
+# Parts of the deviation that are tried one after the other, until the mesh is closed.
+_FINER = (1.0, 0.5, 0.2, 0.05)
 
 
 def write_meshed_stl(
@@ -43,6 +50,8 @@ def write_meshed_stl(
 
     STL knows nothing but coordinates: where the solid touches itself in a line, four triangles would share an
     edge. There the vertices, which are distinct in the solid, are moved apart by a thousandth of the deviation.
+
+    What the mesher leaves open is meshed again, more finely; what stays open is not written.
 
     Parameters
     ----------
@@ -58,22 +67,52 @@ def write_meshed_stl(
     ------
     ParameterError, ExportError
     """
-    copy = _meshed_copy(shape, path, deviation, angle)
     with replacing(path) as temporary:
-        _write(copy, temporary, path)
+        for finer in _FINER:
+            _write(_meshed_copy(shape, path, deviation * finer, angle), temporary, path)
+            _, triangles, kept = numbered_corners(binary_stl_corners(temporary))
+            if not unmatched_edges(triangles):
+                break
+        else:
+            raise _left_open(path, triangles, deviation)
+        keep_facets(temporary, kept)
+
+
+def closed_triangles(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
+    """Triangles of a solid as :func:`meshed` makes them, and more finely where those are open.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    for finer in _FINER:
+        vertices, triangles = meshed(shape, path, deviation * finer, angle)
+        if not unmatched_edges(triangles):
+            return vertices, triangles
+    raise _left_open(path, triangles, deviation)
+
+
+def _left_open(path: str | os.PathLike[str], triangles: NDArray[np.integer], deviation: float) -> ExportError:
+    return ExportError(
+        f"{path} was not written: with deviation = {deviation:g} mm, and with less, the kernel's mesher leaves "
+        f"{unmatched_edges(triangles)} edges that two triangles do not share; another deviation may do"
+    )
 
 
 def meshed(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
     """Triangles of a shape as arrays, for formats other than STL.
 
     They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
-    Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
+    Python. Corners are the same where their coordinates are, to the last bit, as in any STL. A shape so far off that
+    single precision would be too coarse there is brought near the origin for that, and the triangles back.
 
     Returns
     -------
-    vertices : ndarray of float32, shape (vertices, 3)
+    vertices : ndarray, shape (vertices, 3)
         In mm.
     triangles : ndarray of int32, shape (triangles, 3)
 
@@ -87,12 +126,12 @@ def meshed(
 
 def meshed_by_face(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+) -> tuple[NDArray[np.floating], NDArray[np.int32], NDArray[np.int64]]:
     """Triangles as :func:`meshed` makes them, and the face that each lies on, as ``TopExp_Explorer`` counts faces.
 
     Returns
     -------
-    vertices : ndarray of float32, shape (vertices, 3)
+    vertices : ndarray, shape (vertices, 3)
         In mm.
     triangles : ndarray of int32, shape (triangles, 3)
     faces : ndarray of int, shape (triangles,)
@@ -101,14 +140,24 @@ def meshed_by_face(
     ------
     ParameterError, ExportError
     """
-    copy = _meshed_copy(shape, path, deviation, angle)
+    away = _brought_near(shape, deviation)
+    copy = _meshed_copy(shape if away is None else shape.Moved(translation((-away).tolist())), path, deviation, angle)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "triangles.stl"
         _write(copy, file, path)
         vertices, triangles, kept = numbered_corners(binary_stl_corners(file))
     # The kernel writes them face by face.
     counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
-    return vertices, triangles.astype(np.int32), np.repeat(np.arange(len(counts)), counts)[kept]
+    faces = np.repeat(np.arange(len(counts)), counts)[kept]
+    return vertices if away is None else vertices + away, triangles.astype(np.int32), faces
+
+
+def _brought_near(shape: TopoDS_Shape, deviation: float) -> Floats | None:
+    """Middle of a shape that stands too far off for single precision; None of one that does not."""
+    low, high = corners_of(box_round([shape]))
+    if not is_coarse(float(np.abs([low, high]).max()), float(np.linalg.norm(high - low)), deviation):
+        return None
+    return np.asarray(low + high) / 2
 
 
 def _triangle_count(face: TopoDS_Shape) -> int:

@@ -23,6 +23,7 @@ __all__ = [
     "kernel_surface",
     "nurbs_of_surface",
     "parameter_line",
+    "translation",
 ]
 
 Floats = NDArray[np.float64]
@@ -112,7 +113,7 @@ class WallGeometry:
     def __init__(self, wall: Wall) -> None:
         self.wall = wall
         # One location object a translation: the kernel compares locations by how they were made.
-        self._locations = [_translation(shift) for shift in wall.shifts.tolist()]
+        self._locations = [translation(shift) for shift in wall.shifts.tolist()]
         self._patch_net, self._patch_shift = wall.patch_net.tolist(), wall.patch_shift.tolist()
         self._forward = wall.complex.edge_forward.tolist()
         self._faces: dict[tuple[int, int], Geom_BSplineSurface] = {}
@@ -166,7 +167,8 @@ def _border_lines() -> list[tuple[Geom2d_Line, Geom2d_Line]]:
     ]
 
 
-def _translation(shift: list[float]) -> TopLoc_Location:
+def translation(shift: list[float]) -> TopLoc_Location:
+    """Location of what is shifted by so many mm along x, y and z."""
     transformation = gp_Trsf()
     transformation.SetTranslation(gp_Vec(*shift))
     return TopLoc_Location(transformation)

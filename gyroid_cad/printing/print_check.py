@@ -16,6 +16,7 @@ from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.mesh.triangles.channels import way_out
 from gyroid_cad.mesh.triangles.files import read_triangles
 from gyroid_cad.mesh.triangles.measures import TriangleMeasures, measured_walls, triangle_measures
 from gyroid_cad.printing.printers import Printer, printer_named
@@ -33,6 +34,8 @@ _WALLS_MEASURED = 4000
 _UNITS = "STL in mm (STL has no unit: PreForm takes mm), 3MF says mm itself"
 # A part as long as the build volume, but for rounding, fits.
 _ROUNDING = 1e-9
+# What has no height, a single face, is taken for so many mm high.
+_FLAT = 1e-9
 
 
 @runtime_checkable
@@ -68,7 +71,10 @@ class PrintCheck:
     scale_for_supported_wall, scale_for_wall : float, optional
         The scales from which on the smallest wall would pass as one that others support, and as one that stands free.
     opening : float, optional
-        Diameter of the largest sphere that passes through a lattice's channels; unknown of triangles.
+        Diameter of the largest sphere that passes through a lattice's channels, or of triangles, that gets out of every
+        hollow; None where there is none, or triangles do not close.
+    opening_within : float, optional
+        How closely that was measured in triangles; 0 if it was worked out, None if it was not looked for.
     trapped_voids : int
         Regions of empty space that do not reach outside.
     pieces : int
@@ -88,6 +94,7 @@ class PrintCheck:
     scale_for_supported_wall: float | None
     scale_for_wall: float | None
     opening: float | None
+    opening_within: float | None
     trapped_voids: int
     pieces: int
     open_edges: int
@@ -179,13 +186,15 @@ class PrintCheck:
     def _drain_rows(self) -> list[tuple[str, str, str]]:
         voids = "none" if self.trapped_voids == 0 else f"{self.trapped_voids}: resin cannot leave"
         rows = [("trapped voids", f"{self.trapped_voids} regions that do not reach outside", voids)]
+        within = f" (to {self.opening_within:.2g} mm)" if self.opening_within else ""
         if self.opening is not None:
-            finding = f"spheres up to {max(self.opening, 0.0):.4g} mm pass; drain holes {self._hole:g} mm"
-            rows.append(("channels", finding, "drain" if self.drains else "narrow: rinse long, or larger cells"))
+            verdict = "drain" if self.drains else "narrow: rinse long, or larger cells"
+            finding = f"spheres up to {max(self.opening, 0.0):.4g} mm pass{within}"
+        elif self.opening_within is not None:
+            verdict, finding = "none", f"no hollow with a narrower way out{within}"
         else:
-            finding = f"not measured in triangles; drain holes {self._hole:g} mm"
-            rows.append(("channels", finding, "unknown"))
-        return rows
+            verdict, finding = "unknown", "not measured: what is not closed has no inside"
+        return [*rows, ("channels", f"{finding}; drain holes {self._hole:g} mm", verdict)]
 
     @property
     def _hole(self) -> float:
@@ -212,8 +221,8 @@ def print_check(
 
     Of a lattice or a filled part the smallest wall is known, and of a lattice the channels' opening is worked out from
     the exact surface. Of triangles the walls are measured through them, straight from one side to one that faces away,
-    at some thousands of places. Pieces are what is connected; layers that begin in mid-air, which depend on how the
-    part is turned, are for the printer's own program to find.
+    at some thousands of places, sharp edges left out; and the channels on a grid. Pieces are what is connected; layers
+    that begin in mid-air, which depend on how the part is turned, are for the printer's own program to find.
 
     Parameters
     ----------
@@ -255,11 +264,12 @@ def print_check(
         accepted = "a Lattice, a filled part, an STL or 3MF file, or arrays of vertices and triangles"
         raise ParameterError("part", part, accepted)
     found = triangle_measures(vertices, triangles)
+    ways = way_out(vertices, triangles) if found.closed and not found.inside_out else (None, None)
     if min_wall is not None:
-        return _checked(chosen, found.high - found.low, min_wall, 0, None, found)
+        return _checked(chosen, found.high - found.low, min_wall, 0, ways, found)
     walls = measured_walls(vertices, triangles, _WALLS_MEASURED)
     smallest = float(walls[0]) if len(walls) else None
-    return _checked(chosen, found.high - found.low, smallest, len(walls), None, found)
+    return _checked(chosen, found.high - found.low, smallest, len(walls), ways, found)
 
 
 def _check_lattice(
@@ -275,11 +285,11 @@ def _check_lattice(
     if fitted.spec.trimmed:
         limit = min(lattice.cell_size / 1000, fitted.min_thickness / 10) if deviation is None else deviation
         found = triangle_measures(*_triangles_of(lattice.solid(progress), limit))
-        return _checked(printer, found.high - found.low, fitted.min_thickness, 0, opening, found)
+        return _checked(printer, found.high - found.low, fitted.min_thickness, 0, (opening, 0.0), found)
     low, high = fitted.bounding_box()
     count = lattice.triangles(deviation, progress).triangulation.triangle_count
     voids, pieces = trapped_voids(fitted.complex), fitted.complex.component_count
-    return _checked(printer, high - low, fitted.min_thickness, 0, opening, (voids, pieces, count))
+    return _checked(printer, high - low, fitted.min_thickness, 0, (opening, 0.0), (voids, pieces, count))
 
 
 def _triangles_of(shape: KernelShape, deviation: float) -> tuple[NDArray[np.floating], NDArray[np.integer]]:
@@ -309,11 +319,11 @@ def _checked(
     extents: NDArray[np.float64],
     min_wall: float | None,
     walls_measured: int,
-    opening: float | None,
+    ways: tuple[float | None, float | None],
     found: TriangleMeasures | tuple[int, int, int],
 ) -> PrintCheck:
     x, y, z = extents.tolist()
-    volume = np.array(printer.build_volume)
+    volume, extents = np.array(printer.build_volume), np.maximum(extents, _FLAT)
     scales = {order: float(np.min(volume / extents[list(order)])) for order in permutations(range(3))}
     # As it stands, if it fits so.
     fitting = next((order for order, scale in scales.items() if scale >= 1 - _ROUNDING), None)
@@ -332,7 +342,8 @@ def _checked(
         walls_measured=walls_measured,
         scale_for_supported_wall=None if wall is None else printer.min_supported_wall / wall,
         scale_for_wall=None if wall is None else printer.min_unsupported_wall / wall,
-        opening=opening,
+        opening=ways[0],
+        opening_within=ways[1],
         trapped_voids=counts[0],
         pieces=counts[1],
         open_edges=counts[2],

@@ -265,6 +265,18 @@ def test_a_block_of_cells_that_a_map_carries_fills_a_part(capsys: Captured, tmp_
     assert expected.volume != pytest.approx(fill(part, 10, density=0.3, fit=FitSettings(6)).report.volume, rel=1e-3)
 
 
+def test_a_network_cut_by_a_box_is_not_too_thin_for_the_sharp_edges_of_the_cut(tmp_path: Path) -> None:
+    network, path = (
+        fill(cq.Workplane().box(10, 10, 10), 10, density=0.4, kind="network-a", fit=FitSettings(5)),
+        tmp_path / "a.3mf",
+    )
+    network.write(path, deviation=0.03)
+    check = print_check(path)
+    assert check.min_wall is not None
+    assert check.min_wall > 0.4
+    assert check.passed
+
+
 def test_a_printer_checks_what_is_left_of_the_part(capsys: Captured, small: Path) -> None:
     options = ["--thickness", "0.3", "--deviation", "0.1", "--printer", "form2"]
     done = run(capsys, small, "-o", small.with_name("a.brep"), *FILL, *options, "--json")

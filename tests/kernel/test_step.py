@@ -290,6 +290,17 @@ def inches_by_build123d(box: TopoDS_Shape, path: Path) -> None:
     bd.export_step(bd.Solid(box), path, unit=bd.Unit.IN)
 
 
+@pytest.fixture
+def lengths() -> Iterator[None]:
+    """What a host leaves the kernel taking lengths for is put right again, for whatever is read after the test."""
+    keys = ("xstep.cascade.unit", "write.step.unit")
+    before = [Interface_Static.CVal_s(key) for key in keys]
+    yield
+    for key, value in zip(keys, before, strict=True):
+        Interface_Static.SetCVal_s(key, value)
+
+
+@pytest.mark.usefixtures("lengths")
 @pytest.mark.parametrize("write_inches", [inches_by_cadquery, inches_by_build123d])
 def test_a_host_that_writes_inches_changes_no_length_of_ours(
     write_inches: Callable[[TopoDS_Shape, Path], None], tmp_path: Path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -129,8 +130,20 @@ def test_a_lattices_own_stl_says_what_the_lattice_says(tmp_path: Path) -> None:
     assert by_file.triangles == by_lattice.triangles
     assert by_file.min_wall == pytest.approx(0.8, abs=0.04)
     assert (by_file.pieces, by_file.trapped_voids, by_file.open_edges) == (1, 0, 0)
-    assert by_file.opening is None
-    assert by_file.drains is None
+    assert by_lattice.opening is not None
+    assert by_file.opening is not None
+    assert by_file.opening_within is not None
+    assert by_file.opening == pytest.approx(by_lattice.opening, abs=by_file.opening_within)
+    assert by_file.drains == by_lattice.drains
+
+
+def test_of_triangles_that_do_not_close_nothing_inside_is_told_and_no_warning_given() -> None:
+    facing = np.array([[0.0, 0, 0], [5, 0, 0], [5, 5, 0], [0, 5, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check = print_check(facing)
+    assert (check.opening, check.opening_within, check.min_wall, check.passed) == (None, None, None, False)
+    assert check.rows()[3][2] == "unknown"
 
 
 def test_a_void_within_a_ball_is_trapped_and_a_part_of_two_is_not_one_piece() -> None:

@@ -13,7 +13,7 @@ from gyroid_cad.common.arrays import dot, freeze_arrays
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import GyroidError
 
-__all__ = ["TriangleMeasures", "measured_walls", "triangle_measures"]
+__all__ = ["TriangleMeasures", "measured_walls", "surface_places", "triangle_measures", "unmatched_edges"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -88,6 +88,34 @@ class TriangleMeasures:
         return int(np.sum(self.inwards & ~self.inside))
 
 
+def unmatched_edges(triangles: NDArray[np.integer]) -> int:
+    """Count edges that are not used by two triangles, once each way; none of a closed surface that is a manifold.
+
+    Parameters
+    ----------
+    triangles : ndarray of int, shape (triangles, 3)
+
+    Examples
+    --------
+    >>> tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> unmatched_edges(tetrahedron), unmatched_edges(tetrahedron[1:])
+    (0, 3)
+    """
+    _, _, one_way, uses = _edge_uses(np.asarray(triangles, dtype=np.int64))
+    return int(np.sum((uses != 2) | (one_way != 1)))
+
+
+def _edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
+    """Edges in an order that brings uses of one together, where each begins there, and how often it is used one way."""
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    keys = edges.min(axis=1) * (int(facets.max(initial=0)) + 1) + edges.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    first = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))
+    return order, first, one_way, uses
+
+
 def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> TriangleMeasures:
     """Measure triangles: their size, whether they close, and what they enclose.
 
@@ -103,14 +131,10 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     TriangleMeasures
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
-    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
-    forward = edges[:, 0] < edges[:, 1]
-    keys = edges.min(axis=1) * len(points) + edges.max(axis=1)
-    order = np.argsort(keys, kind="stable")
-    same, owner = keys[order][1:] == keys[order][:-1], order // 3
+    order, first, one_way, uses = _edge_uses(facets)
+    owner, same = order // 3, np.ones(max(len(order) - 1, 0), dtype=np.bool_)
+    same[first[1:] - 1] = False
     labels = connected(len(facets), owner[:-1][same], owner[1:][same])
-    first = np.flatnonzero(np.concatenate([[True], ~same]))
-    one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))
     opened = 2 * one_way != uses
     # Near the triangles, so that volumes far from the origin lose no digits.
     a, b, c = np.moveaxis(points[facets] - points.mean(axis=0), 1, 0)
@@ -155,11 +179,19 @@ def _inside_another(points: Floats, triangles: Integers, labels: Integers, shell
 
 # A ray starts so far inside, as a part of the solid's size: beyond rounding, and far below any wall.
 _STARTS_INSIDE = 1e-6
+_ROUNDING = 1e-12
 # How near a line must pass a triangle to meet it, as a part of the solid's size: with none VTK misses some.
 _MEETS = 1e-9
 # A wall has two sides that face away from each other, within 45 degrees; tips and edges, which run out to nothing, have
 # not.
 _FACING_AWAY = -np.sqrt(0.5)
+# Sides at less than this angle run out to a sharp edge.
+_SHARP = np.radians(80)
+# Beside an edge the solid is as thick as the angle makes it, by the distance to the edge; where its sides are curved,
+# so many times less. Further off than so many walls it is thin for its own sake, as a blade of 14 degrees is.
+_BESIDE_EDGE, _WALLS_AWAY = 2.5, 4.0
+# How far points of edges are apart, as a part of the solid's size, and how many of them a place looks at.
+_EDGE_STEP, _EDGES_NEARBY = 0.005, 8
 
 
 def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer], places: int) -> Floats:
@@ -181,7 +213,7 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
     -------
     ndarray
         In mm, sorted; one for each place whose ray meets the surface again on a side that faces away, within 45
-        degrees.
+        degrees, and not where the solid runs out to a sharp edge.
 
     Raises
     ------
@@ -191,16 +223,58 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
     points, facets = np.array(vertices, dtype=float, order="C"), np.array(triangles, dtype=np.int64, order="C")
     core = _vtk("vtkCommonCore")
     locator = _locator(points, facets)
-    starts, inward, normals = _places(points, facets, places)
+    starts, inward, normals = surface_places(points, facets, places)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     starts = starts + _STARTS_INSIDE * size * inward
-    found = []
-    for start, direction in zip(starts, inward, strict=True):
+    found, at = [], []
+    for number, (start, direction) in enumerate(zip(starts, inward, strict=True)):
         part, place, local, sub, cell = core.mutable(0.0), [0.0] * 3, [0.0] * 3, core.mutable(0), core.mutable(-1)
         met = locator.IntersectWithLine(start, start + size * direction, _MEETS * size, part, place, local, sub, cell)
         if met and -direction @ normals[int(cell)] < _FACING_AWAY:
             found.append(float(part) * size)
-    return np.sort(np.array(found)) + _STARTS_INSIDE * size
+            at.append(number)
+    walls = np.array(found) + _STARTS_INSIDE * size
+    return np.sort(walls[~_run_out(points, facets, normals, starts[at], walls)])
+
+
+def _run_out(points: Floats, facets: Integers, normals: Floats, places: Floats, walls: Floats) -> Booleans:
+    """Tell which walls were measured where the solid runs out to a sharp edge: that is as thin as one looks for.
+
+    From a place beside an edge of angle a the other side is seen at tan(a) times the distance to the edge.
+    """
+    from scipy.spatial import cKDTree
+
+    ends, slopes = _sharp_edges(points, facets, normals)
+    if not len(ends) or not len(walls):
+        return np.zeros(len(walls), dtype=np.bool_)
+    along = ends[:, 1] - ends[:, 0]
+    # Points of edges find those nearby: of long ones there must be many.
+    counts = np.ceil(np.linalg.norm(along, axis=1) / (_EDGE_STEP * np.ptp(points, axis=0).max())).astype(np.int64)
+    edge = np.repeat(np.arange(len(ends)), counts)
+    part = (np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[edge]
+    _, near = cKDTree(ends[edge, 0] + part[:, np.newaxis] * along[edge]).query(places, min(_EDGES_NEARBY, len(edge)))
+    near = edge[near.reshape(len(places), -1)]
+    offset = places[:, np.newaxis] - ends[near, 0]
+    part = np.clip(dot(offset, along[near]) / dot(along[near], along[near]), 0, 1)
+    distance = np.linalg.norm(offset - part[..., np.newaxis] * along[near], axis=-1)
+    reach = np.minimum(_BESIDE_EDGE / slopes[near], _WALLS_AWAY) * walls[:, np.newaxis]
+    return np.asarray(np.any(distance < reach, axis=1))
+
+
+def _sharp_edges(points: Floats, facets: Integers, normals: Floats) -> tuple[Floats, Floats]:
+    """Ends of the edges at which a solid's sides meet sharply, shape (n, 2, 3), and the tangents of their angles."""
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
+    keys = edges.min(axis=1) * len(points) + edges.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    pair = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    one, other = order[pair], order[pair + 1]
+    # The corner of the one triangle that is not on the edge lies behind the other triangle where the edge is convex.
+    apex = points[facets[one // 3, (one + 2) % 3]]
+    cosine = -dot(normals[one // 3], normals[other // 3])
+    convex = dot(apex - points[edges[one, 0]], normals[other // 3]) < 0
+    sharp = convex & (cosine > np.cos(_SHARP)) & (edges[one, 0] != edges[one, 1])
+    cosine = np.minimum(cosine[sharp], 1 - _ROUNDING)
+    return points[edges[one[sharp]]], np.sqrt(1 - cosine**2) / cosine
 
 
 def _locator(points: Floats, triangles: NDArray[np.int64]) -> Any:
@@ -226,8 +300,24 @@ def _vtk(module: str) -> Any:
         raise GyroidError(f"measuring the walls of triangles needs VTK (pip install vtk): {problem}") from None
 
 
-def _places(points: Floats, triangles: NDArray[np.int64], count: int) -> tuple[Floats, Floats, Floats]:
-    """Places spread evenly over the surface, the unit normals into the solid there, and those out of all triangles."""
+def surface_places(points: Floats, triangles: Integers, count: int) -> tuple[Floats, Floats, Floats]:
+    """Places spread evenly over a surface, by a generator that always starts alike.
+
+    Parameters
+    ----------
+    points : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+    count : int
+
+    Returns
+    -------
+    places, inward : ndarray, shape (count, 3)
+        In mm, and the unit normals into the solid there.
+    normals : ndarray, shape (triangles, 3)
+        Unit normals out of the solid, of all triangles.
+    """
     generator = np.random.default_rng(0)
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     outward = np.cross(b - a, c - a)

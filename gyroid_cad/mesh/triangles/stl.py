@@ -7,10 +7,10 @@ corners as single-precision numbers, and two bytes of attributes, all little-end
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.progress import Progress, report_progress
@@ -18,7 +18,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.triangles.corners import Corners, FaceGroup, face_groups, side_groups
 from gyroid_cad.mesh.triangles.triangulation import Triangulation
 
-__all__ = ["write_stl"]
+__all__ = ["is_coarse", "require_near_origin", "write_stl"]
 
 Singles = NDArray[np.float32]
 # Four single-precision numbers each, handed about as one.
@@ -40,6 +40,9 @@ _FIRST_TWELVE = np.dtype({"names": ["corner"], "formats": [_TWELVE_BYTES], "offs
 _HEADER = b"gyroid_cad, millimetres".ljust(80)
 # The count of triangles has 32 bits.
 MOST_TRIANGLES = 2**32 - 1
+# Numbers of single precision may be so far apart where a part stands, in deviations of its triangles; and a deviation
+# counts for no more than this part of the part's size.
+_ROUNDED, _COARSE = 0.25, 1e-3
 # So few that records and corners stay in the processor's cache.
 _TRIANGLES_AT_ONCE = 20_000
 _FLUSHED_BYTES = 16_000_000
@@ -90,6 +93,58 @@ def _start_writing(file: int) -> None:
     """Let the disk begin with what was written, so that synchronising at the end takes less; where that is possible."""
     if hasattr(os, "posix_fadvise"):
         os.posix_fadvise(file, 0, 0, os.POSIX_FADV_DONTNEED)
+
+
+def require_near_origin(
+    path: str | os.PathLike[str], corners: Sequence[ArrayLike] | NDArray[np.floating], deviation: float
+) -> None:
+    """Refuse triangles so far from the origin that their corners, rounded to single precision, would cross.
+
+    What rounding is due to the size of the part is left to it.
+
+    Parameters
+    ----------
+    path : path-like
+        Of an STL or 3MF file.
+    corners : array_like, shape (2, 3)
+        Lowest and highest corner of the box round the part, in mm.
+    deviation : float
+        Of the triangles from the part, in mm.
+
+    Raises
+    ------
+    ParameterError
+    """
+    box = np.asarray(corners, dtype=float)
+    size, reach = float(np.linalg.norm(box[1] - box[0])), float(np.abs(box).max())
+    if not is_coarse(reach, size, deviation):
+        return
+    most = max(size, _rounding_allowed(size, deviation) / float(np.finfo(np.float32).eps))
+    raise ParameterError(
+        "output",
+        str(path),
+        f"STEP or BREP, or a part within about {most:.2g} mm of the origin: numbers of single precision, as STL and "
+        f"3MF have them, are {float(np.spacing(np.float32(reach))):.2g} mm apart where this one is, {reach:.3g} mm off",
+    )
+
+
+def is_coarse(reach: float, size: float, deviation: float) -> bool:
+    """Tell whether single precision is too coarse for triangles of a part, for where it stands and not for its size.
+
+    Parameters
+    ----------
+    reach : float
+        Largest coordinate, in mm.
+    size : float
+        Of the part, in mm.
+    deviation : float
+        Of the triangles from the part, in mm.
+    """
+    return reach > size and float(np.spacing(np.float32(reach))) > _rounding_allowed(size, deviation)
+
+
+def _rounding_allowed(size: float, deviation: float) -> float:
+    return max(_ROUNDED * min(deviation, _COARSE * size), float(np.spacing(np.float32(size))))
 
 
 class _Space:

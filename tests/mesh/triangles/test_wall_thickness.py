@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -39,6 +40,20 @@ def test_the_edge_of_a_wedge_is_no_wall() -> None:
     walls = measured_walls(wedge.vertices, wedge.faces, 2000)
     # Of the 45 degree edge only the two ends, eight apart, face away from each other.
     assert walls == pytest.approx(8.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("angle", [16, 25, 40])
+def test_where_a_plate_runs_out_to_an_edge_its_wall_is_that_of_the_plate(angle: float) -> None:
+    out = 1.5 / np.tan(np.radians(angle))
+    profile = [[0, 0], [10 + out, 0], [10, 1.5], [0, 1.5]]
+    plate = trimesh.creation.extrude_triangulation(profile, [[0, 1, 2], [0, 2, 3]], 30.0)
+    walls = measured_walls(plate.vertices, plate.faces, 2000)
+    assert walls[0] == pytest.approx(1.5, rel=1e-3)
+
+
+def test_a_blade_is_thin_for_its_own_sake() -> None:
+    blade = trimesh.creation.extrude_triangulation([[0, 0], [30, 0], [0, 3]], [[0, 1, 2]], 30.0)
+    assert measured_walls(blade.vertices, blade.faces, 2000)[0] < 0.1
 
 
 @pytest.mark.parametrize("surface", ["gyroid", "diamond", "primitive"])

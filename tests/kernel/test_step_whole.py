@@ -1,0 +1,82 @@
+"""What a STEP file holds is counted in its own text; a file that lost something is not left behind."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+from OCP.BRepPrimAPI import (
+    BRepPrimAPI_MakeBox,
+    BRepPrimAPI_MakeCone,
+    BRepPrimAPI_MakePrism,
+    BRepPrimAPI_MakeSphere,
+    BRepPrimAPI_MakeTorus,
+)
+from OCP.Geom import Geom_OffsetCurve
+from OCP.GeomAPI import GeomAPI_PointsToBSpline
+from OCP.gp import gp_Dir, gp_Pnt, gp_Vec
+from OCP.TColgp import TColgp_Array1OfPnt
+
+from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.check import Topology, topology
+from gyroid_cad.kernel.step import read_step, topology_in_step, write_step
+from gyroid_cad.lattice import Lattice
+
+PARTS = sorted((Path(__file__).parents[3] / "shared" / "parts").glob("*.step"))
+DRAWN = {
+    "box": lambda: BRepPrimAPI_MakeBox(3, 4, 5).Shape(),
+    "ball": lambda: BRepPrimAPI_MakeSphere(3).Shape(),
+    "ring": lambda: BRepPrimAPI_MakeTorus(5, 1).Shape(),
+    "cone with its tip": lambda: BRepPrimAPI_MakeCone(3, 0, 5).Shape(),
+}
+
+
+def along_an_offset_curve() -> Any:
+    """A prism whose face over a spline's offset curve the kernel's writer leaves out without a word."""
+    points = TColgp_Array1OfPnt(1, 5)
+    for number, (x, y) in enumerate([(0, 0), (2, 1), (4, -0.5), (6, 1), (8, 0)], 1):
+        points.SetValue(number, gp_Pnt(x, y, 0))
+    curve = Geom_OffsetCurve(GeomAPI_PointsToBSpline(points).Curve(), 3.0, gp_Dir(0, 0, 1))
+    start, end = curve.Value(curve.FirstParameter()), curve.Value(curve.LastParameter())
+    corners = [end, gp_Pnt(end.X(), -20, 0), gp_Pnt(start.X(), -20, 0), start]
+    straight = [BRepBuilderAPI_MakeEdge(a, b).Edge() for a, b in pairwise(corners)]
+    wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(curve).Edge(), *straight).Wire()
+    return BRepPrimAPI_MakePrism(BRepBuilderAPI_MakeFace(wire).Face(), gp_Vec(0, 0, 5)).Shape()
+
+
+@pytest.mark.parametrize("draw", DRAWN.values(), ids=DRAWN)
+def test_the_text_counts_what_the_kernel_does(draw: Any, tmp_path: Path) -> None:
+    shape = draw()
+    write_step(shape, tmp_path / "a.step", parameter_curves=True)
+    assert topology_in_step(tmp_path / "a.step") == topology(shape)
+
+
+def test_of_a_lattice_too(cell: Lattice, tmp_path: Path) -> None:
+    cell.write(tmp_path / "a.step")
+    assert topology_in_step(tmp_path / "a.step") == topology(cell.solid()) == Topology(1, cell.report().faces, 0)
+
+
+@pytest.mark.parametrize("part", PARTS or [None], ids=lambda part: part.stem if part else "no parts")
+def test_a_part_that_others_drew_is_written_whole_or_not_at_all(part: Path | None, tmp_path: Path) -> None:
+    if part is None:
+        pytest.skip("the folder of parts is not there")
+    shape = read_step(part)
+    if part.stem == "dm1-id-214":
+        # An assembly, of which the writer puts down one solid for all of its places.
+        with pytest.raises(ExportError, match="3 of 7 solids"):
+            write_step(shape, tmp_path / "a.step", parameter_curves=True)
+        return
+    write_step(shape, tmp_path / "a.step", parameter_curves=True)
+    found, wanted = topology_in_step(tmp_path / "a.step"), topology(shape)
+    assert (found.solids, found.faces, found.open_edges) == (wanted.solids, wanted.faces, 0)
+
+
+def test_a_file_whose_writer_left_faces_out_is_not_left_behind(tmp_path: Path) -> None:
+    (tmp_path / "a.step").write_text("what was there")
+    with pytest.raises(ExportError, match="3 of 6 faces and 8 open edges; BREP holds"):
+        write_step(along_an_offset_curve(), tmp_path / "a.step", parameter_curves=True)
+    assert (tmp_path / "a.step").read_text() == "what was there"
+    assert [file.name for file in tmp_path.iterdir()] == ["a.step"]

@@ -53,6 +53,7 @@ FORMER_NAMES = {
     "weierstrass": "GYROID",
 }
 
+
 def starred(package: str) -> set[str]:
     """Names that ``import *`` brings from a package."""
     space: dict[str, object] = {}

@@ -225,7 +225,7 @@ def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> Non
 def test_what_cannot_be_written_is_refused_before_anything_is_built(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: list[str], settings: dict[str, Any], words: str
 ) -> None:
-    for function in ("builds.solid.build", "lattice.triangles"):
+    for function in ("builds.solid.build", "builds.meshes.triangles"):
         monkeypatch.setattr(f"gyroid_cad.{function}", lambda *_: pytest.fail("it was built"))
     with pytest.raises(ParameterError) as caught:
         Lattice(**GOOD).write(*(tmp_path / name for name in names), **settings)

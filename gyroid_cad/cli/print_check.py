@@ -17,7 +17,7 @@ from gyroid_cad.common.formats import TOML, TRIANGLE_FORMATS, format_of, require
 
 if TYPE_CHECKING:
     from gyroid_cad.common.progress import Progress
-    from gyroid_cad.printing.print_check import PrintCheck
+    from gyroid_cad.printing.verdict import PrintCheck
 
 __all__ = ["check_by", "print_check_command"]
 

@@ -99,7 +99,7 @@ def diagonal_of(parts: Sequence[ColouredPart]) -> float:
 
 
 class _Occurrences:
-    """Where parts occur, by the entries of their labels and the colours that their occurrences put over them."""
+    """Places of parts, by the entries of their labels and the colours that their occurrences put over them."""
 
     def __init__(self, document: TDocStd_Document) -> None:
         self._colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())

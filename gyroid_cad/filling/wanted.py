@@ -88,6 +88,11 @@ class Regions:
     thickness: float | Field | None = None
     density: float | Field | None = None
 
+    @property
+    def uniform(self) -> bool:
+        """Whether the wall is the same everywhere."""
+        return not isinstance(self.thickness, Field | None)
+
 
 def regions_of(
     kind: Kind, cell_size: float, thickness: FieldLike | None, density: FieldLike | None, tube: TubeLaw

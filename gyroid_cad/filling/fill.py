@@ -35,6 +35,7 @@ from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.trim.islands import Islands, island_rule
 from gyroid_cad.wall.covering import Frame, frame_of, placement
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
@@ -260,7 +261,8 @@ def fill(
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it.
     tolerance : float, optional
-        Largest deviation in cell sizes of a graded wall; 1e-4 if left out.
+        Largest deviation of the fit in cell sizes; if left out, 1e-4 of a graded wall, and what ``fit`` gives of a
+        uniform one.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
         size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
@@ -287,14 +289,14 @@ def fill(
     if shell is not None and kind == SURFACE:
         raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
     rule = island_rule(keep_islands, drop_islands)
-    closeness = USUAL_TOLERANCE if tolerance is None else valid_tolerance(tolerance)
+    closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    regions, size, infill_in = _described(
+    regions, size, settings, infill_in = _described(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
     )
     whole = part_of(part)
     if lattice is None:
-        require_cover(whole.low, whole.high, size, (fit or FitSettings()).control_points)
+        require_cover(whole.low, whole.high, size, settings.control_points)
     hollow = None if shell is None else _hollowed(whole, shell, openings)
     core = whole if hollow is None else hollow.core
     filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
@@ -314,26 +316,28 @@ def _described(
     thickness: FieldLike | None,
     density: FieldLike | None,
     fit: FitSettings,
-    tolerance: float,
+    tolerance: float | None,
     lattice: Lattice | None,
     surface: MinimalSurface,
-) -> tuple[tuple[Region, ...], float, _InfillIn]:
-    """The regions wanted, the cell size, and how the lattice is to be had for a part and a frame."""
+) -> tuple[tuple[Region, ...], float, FitSettings, _InfillIn]:
+    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame."""
     if lattice is not None:
-        given = {"cell_size": cell_size, "thickness": thickness, "density": density}
+        given = {"cell_size": cell_size, "thickness": thickness, "density": density, "tolerance": tolerance}
         for name, value in given.items():
             if value is not None:
                 raise ParameterError(name, value, "none beside a lattice, which has its own")
         if kind != SHEET:
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
         regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
-        return regions.regions, lattice.cell_size, lambda part, frame, timed: block_infill(lattice, frame)
+        return regions.regions, lattice.cell_size, fit, lambda part, frame, timed: block_infill(lattice, frame)
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
+    if wanted.uniform and tolerance is not None:
+        fit = fit_within(fit, tolerance, surface.family)
 
     def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
-        made = endless_infill(part, frame, size, wanted, fit, tolerance, timed, surface)
+        made = endless_infill(part, frame, size, wanted, fit, tolerance or USUAL_TOLERANCE, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
             name, given = ("thickness", thickness) if density is None else ("density", density)
@@ -344,7 +348,7 @@ def _described(
             )
         return made
 
-    return wanted.regions, size, endless
+    return wanted.regions, size, fit, endless
 
 
 def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:

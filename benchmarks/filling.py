@@ -8,7 +8,7 @@ part's inside told by rays through a fine mesh of it, the wall by distance to de
 boolean is asked.
 
 Run: ``python -m benchmarks.filling [--small]``; ``--small`` fills a part of a period, few
-cells and a small ball.
+cells and a small cylinder.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Shape
 
@@ -136,7 +136,7 @@ def _run_alone(what: str, cells: int) -> None:
 
 def _free_forms(small: bool) -> list[Row]:
     if small:
-        return _against_columns("ball", _ball(3.0), _COARSE)
+        return _against_columns("cylinder", BRepPrimAPI_MakeCylinder(2.0, 3.0).Shape(), _COARSE)
     bracket = read_step(ROOT / "examples" / "bracket.step")
     return [
         *_against_columns("ball", _ball(12.0), _FINE),

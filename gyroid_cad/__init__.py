@@ -5,8 +5,8 @@ the CAD kernel nor CadQuery nor build123d. Maps of space are in :mod:`gyroid_cad
 :mod:`gyroid_cad.fields`: none of the names here is one of the hosts' too.
 
 >>> from gyroid_cad import Lattice
->>> Lattice(cells=(2, 2, 2), cell_size=10, thickness=0.8).volume_fraction
-0.24517093...
+>>> round(Lattice(cells=(2, 2, 2), cell_size=10, thickness=0.8).volume_fraction, 5)
+0.24517
 """
 
 from __future__ import annotations
@@ -29,12 +29,14 @@ if TYPE_CHECKING:
         SelfIntersectionError,
     )
     from gyroid_cad.fields.field import Field
-    from gyroid_cad.filling.fill import Filled, FillReport, fill
+    from gyroid_cad.filling.fill import Filled, fill
+    from gyroid_cad.filling.report import FillReport
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
     from gyroid_cad.mesh.iga.patches import VolumePatches
-    from gyroid_cad.printing.print_check import PrintCheck, print_check
+    from gyroid_cad.printing.print_check import print_check
     from gyroid_cad.printing.printers import Printer
+    from gyroid_cad.printing.verdict import PrintCheck
     from gyroid_cad.surface.fit import FitSettings
 
 __all__ = [
@@ -73,12 +75,14 @@ _HOMES = {
         "SelfIntersectionError",
     ),
     "fields.field": ("Field",),
-    "filling.fill": ("FillReport", "Filled", "fill"),
+    "filling.fill": ("Filled", "fill"),
+    "filling.report": ("FillReport",),
     "lattice": ("Lattice", "LatticeReport"),
     "mesh.finite_elements.hexahedra": ("Mesh",),
     "mesh.iga.patches": ("VolumePatches",),
-    "printing.print_check": ("PrintCheck", "print_check"),
+    "printing.print_check": ("print_check",),
     "printing.printers": ("Printer",),
+    "printing.verdict": ("PrintCheck",),
     "surface.fit": ("FitSettings",),
 }
 _MOVED = {

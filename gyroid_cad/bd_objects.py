@@ -27,9 +27,7 @@ __all__ = ["Gyroid", "GyroidFill"]
 
 
 class Gyroid(BasePartObject):  # type: ignore[misc]
-    """Part Object: Gyroid
-
-    A lattice of the gyroid, or of another surface, aligned by its bounding box.
+    """Part Object: a lattice of the gyroid, or of another surface, aligned by its bounding box.
 
     Parameters
     ----------
@@ -44,6 +42,13 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
     Raises
     ------
     ParameterError, FitError, KernelError
+
+    Examples
+    --------
+    >>> from gyroid_cad.bd_objects import Gyroid
+    >>> lattice = Gyroid((1, 1, 1), 10, thickness=0.8)
+    >>> len(lattice.solids()), lattice.bounding_box().center().length < 1e-6
+    (1, True)
     """
 
     _applies_to = [BuildPart._tag]  # noqa: RUF012 (the host's own declaration)
@@ -88,9 +93,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
 
 
 class GyroidFill(Part):  # type: ignore[misc]
-    """Part Operation: GyroidFill
-
-    What is left of a part that is filled with gyroid.
+    """Part Operation: a part filled with gyroid, or with another surface's lattice.
 
     Parameters
     ----------
@@ -115,6 +118,14 @@ class GyroidFill(Part):  # type: ignore[misc]
     Raises
     ------
     ParameterError, SelfIntersectionError, FitError, KernelError
+
+    Examples
+    --------
+    >>> from build123d import Box
+    >>> from gyroid_cad.bd_objects import GyroidFill
+    >>> light = GyroidFill(Box(5, 4, 3), 10, thickness=0.8)
+    >>> light.label, light.is_valid
+    ('sheet', True)
     """
 
     def __init__(

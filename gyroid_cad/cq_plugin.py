@@ -69,6 +69,13 @@ def gyroid(
     Raises
     ------
     ParameterError, FitError, KernelError
+
+    Examples
+    --------
+    >>> import cadquery as cq
+    >>> import gyroid_cad.cq_plugin
+    >>> cq.Workplane().gyroid((1, 1, 1), 10, thickness=0.8).solids().size()
+    1
     """
     lattice = Lattice(
         cells,
@@ -131,6 +138,14 @@ def gyroid_fill(
     Raises
     ------
     ParameterError, SelfIntersectionError, FitError, KernelError
+
+    Examples
+    --------
+    >>> import cadquery as cq
+    >>> import gyroid_cad.cq_plugin
+    >>> light = cq.Workplane().box(4, 4, 4, centered=False).gyroid_fill(8, density=0.3)
+    >>> light.val().isValid()
+    True
     """
     selected = [shape for shape in self.objects if isinstance(shape, cq.Face)]
     try:

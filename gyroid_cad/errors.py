@@ -28,7 +28,17 @@ def __getattr__(name: str) -> Any:
 
 
 class GyroidError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of every error this package raises on purpose.
+
+    Examples
+    --------
+    >>> from gyroid_cad import GyroidError, Lattice
+    >>> try:
+    ...     Lattice((1, 1, 1), 10, thickness=-1)
+    ... except GyroidError as problem:
+    ...     print(problem)
+    thickness = -1.0: expected 0.0001 mm or more and below 3.7647 mm, the curvature limit 0.37647 x cell_size
+    """
 
 
 class ParameterError(GyroidError, ValueError):
@@ -42,6 +52,15 @@ class ParameterError(GyroidError, ValueError):
         What was given.
     accepted : str
         What would have been accepted.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice, ParameterError
+    >>> try:
+    ...     Lattice((1, 1, 1), 10, density=30)
+    ... except ParameterError as problem:
+    ...     print(problem.parameter, problem.value)
+    density 30.0
     """
 
     def __init__(self, parameter: str, value: object, accepted: str) -> None:
@@ -77,6 +96,15 @@ class SelfIntersectionError(ParameterError):
         What the value is of, if it is not the parameter itself.
     unit : str
         Of value and limit.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice, SelfIntersectionError
+    >>> try:
+    ...     Lattice((1, 1, 1), 10, thickness="3 + 0.1*x").fitted()
+    ... except SelfIntersectionError as problem:
+    ...     print(problem.reason)
+    where the wall folds over its own curvature
     """
 
     def __init__(
@@ -115,15 +143,41 @@ class SelfIntersectionError(ParameterError):
 
 
 class FitError(GyroidError):
-    """A fit that cannot serve the purpose it was asked for."""
+    """A fit that cannot serve the purpose it was asked for.
+
+    Examples
+    --------
+    >>> from gyroid_cad import FitError, FitSettings, Lattice
+    >>> try:
+    ...     Lattice((1, 1, 1), 10, thickness=0.8, fit=FitSettings.paper()).wall()
+    ... except FitError as problem:
+    ...     print(str(problem)[:40])
+    the edges of neighbouring patches are 4.
+    """
 
 
 class KernelError(GyroidError, RuntimeError):
-    """The CAD kernel returned something that is not the closed, valid solid that was asked for."""
+    """The CAD kernel returned something that is not the closed, valid solid that was asked for.
+
+    Examples
+    --------
+    >>> issubclass(KernelError, GyroidError), issubclass(KernelError, RuntimeError)
+    (True, True)
+    """
 
 
 class ExportError(GyroidError, OSError):
-    """A file that could not be written; nothing was left behind and nothing older was touched."""
+    """A file that could not be written; nothing was left behind and nothing older was touched.
+
+    Examples
+    --------
+    >>> from gyroid_cad import ExportError, fill
+    >>> try:
+    ...     fill("nothere.step", cell_size=8, density=0.3)
+    ... except ExportError as problem:
+    ...     print(problem)
+    nothere.step could not be read: No such file or directory
+    """
 
 
 class MissingHostError(GyroidError, ModuleNotFoundError):
@@ -177,7 +231,16 @@ def host_import(name: str) -> Iterator[None]:
 
 
 class IslandsWarning(UserWarning):
-    """A lattice that was cut falls into pieces: some were dropped, or are left beside the largest one."""
+    """A lattice that was cut falls into pieces: some were dropped, or are left beside the largest one.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from gyroid_cad import IslandsWarning, Lattice
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", IslandsWarning)
+    ...     solid = Lattice((1, 1, 1), 10, density=0.2, trim="box").solid()
+    """
 
 
 def _shown(value: object) -> str:

@@ -13,7 +13,7 @@ __all__ = ["FORMER_MODULES", "METHODS", "FormerModules", "Moved", "former_name",
 
 
 class Moved(NamedTuple):
-    """Where a name is now.
+    """Place where a name is now.
 
     Attributes
     ----------

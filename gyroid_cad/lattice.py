@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING
 
-from gyroid_cad.builds.meshes import hexahedral_mesh, lattice_volumes, quadrilateral_mesh
+from gyroid_cad.builds.meshes import LatticeMeshes
 from gyroid_cad.builds.report import LatticeReport, report_of
-from gyroid_cad.builds.triangles import TriangleReport, Triangles, triangle_report, triangles
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
@@ -19,16 +18,12 @@ from gyroid_cad.common.formats import (
     format_of,
     require_assembly_formats,
     require_formats,
-    require_meshing,
     require_settings,
 )
-from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.progress import Progress
 from gyroid_cad.common.tables import cells_shown
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.host_shapes import HostShapes
-from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
-from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs, periodic_pairs
-from gyroid_cad.mesh.iga.patches import VolumePatches
 from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
@@ -47,7 +42,7 @@ _LENGTH = "a length in mm, a finite number"
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice(LatticeParameters, HostShapes):
+class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
     """A block of cells of the gyroid or another surface: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches
@@ -96,6 +91,15 @@ class Lattice(LatticeParameters, HostShapes):
     ------
     ParameterError
         Naming the parameter, its value and what is accepted.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
+    >>> print(f"{lattice.volume_fraction:.4f}")
+    0.2452
+    >>> Lattice((3, 1, 1), 10, density="0.2 + 0.01*x").uniform
+    False
     """
 
     def wall(self) -> Wall:
@@ -105,11 +109,24 @@ class Lattice(LatticeParameters, HostShapes):
         ------
         FitError
             If the fit's edges do not meet those of its neighbours.
+
+        Examples
+        --------
+        >>> wall = Lattice((1, 1, 1), 10, thickness=0.8).wall()
+        >>> wall.complex.patch_count, wall.face(0, side=1).evaluate(0.0, 0.0).shape
+        (24, (3,))
         """
         return self.fitted().wall
 
     def bounding_box(self) -> tuple[Point, Point]:
-        """Lowest and highest corner of the box round the wall, in mm."""
+        """Lowest and highest corner of the box round the wall, in mm.
+
+        Examples
+        --------
+        >>> low, high = Lattice((1, 1, 1), 10, thickness=0.8).bounding_box()
+        >>> [round(x, 2) for x in low], [round(x, 2) for x in high]
+        ([-2.73, -2.73, -2.73], [12.73, 12.73, 12.73])
+        """
         low, high = (corner.tolist() for corner in self.fitted().bounding_box())
         return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
@@ -137,15 +154,33 @@ class Lattice(LatticeParameters, HostShapes):
             If the fit's edges do not meet those of its neighbours.
         ParameterError
             If memory would not do, or the wall is so thick that the fit folds over.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).solid().ShapeType()
+        <TopAbs_ShapeEnum.TopAbs_SOLID: 2>
         """
         return self.built(progress).solid()
 
     def named_solids(self) -> dict[str, KernelShape]:
-        """The solid under the name of its surface, as hosts show it."""
+        """The solid under the name of its surface, as hosts show it.
+
+        Examples
+        --------
+        >>> list(Lattice((1, 1, 1), 10, thickness=0.8).named_solids())
+        ['gyroid']
+        """
         return {self.surface: self.solid()}
 
     def report(self, progress: Progress | None = None) -> LatticeReport:
-        """Build the solid if it isn't yet, have the kernel check it too, and say what it is."""
+        """Build the solid if it isn't yet, have the kernel check it too, and say what it is.
+
+        Examples
+        --------
+        >>> report = Lattice((1, 1, 1), 10, thickness=0.8).report()
+        >>> report.valid, report.closed, report.faces
+        (True, True, 84)
+        """
         built = self.built(progress)
         built.valid(progress)
         with built.timed("fit report"):
@@ -192,6 +227,11 @@ class Lattice(LatticeParameters, HostShapes):
         Raises
         ------
         ParameterError, FitError, KernelError, ExportError
+
+        Examples
+        --------
+        >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
+        >>> lattice.write("cell.step", "cell.stl", deviation=0.1)
         """
         targets = require_formats(paths)
         if deviation is not None:
@@ -206,10 +246,10 @@ class Lattice(LatticeParameters, HostShapes):
         require_settings(self.cells, schema, deviation, angle, solid=bool(solid))
         for path in targets:
             if format_of(path) in TRIANGLE_FORMATS:
-                require_near_origin(path, self.fitted(progress).bounding_box(), self._deviation(deviation))
+                require_near_origin(path, self.fitted(progress).bounding_box(), self.deviation(deviation))
         if solid:
             built = self.built(progress)
-            built.write(solid, schema, self._deviation(deviation), angle, progress)
+            built.write(solid, schema, self.deviation(deviation), angle, progress)
         if flat:
             self.triangles(deviation, progress).write(*flat, progress=progress)
 
@@ -227,108 +267,37 @@ class Lattice(LatticeParameters, HostShapes):
             If the cells differ, or are trimmed.
         FitError, KernelError
             As of :meth:`solid`.
+
+        Examples
+        --------
+        >>> Lattice((3, 2, 1), 10, thickness=0.8).assembly().write("many.step")
         """
         from gyroid_cad.builds.assembly import assembly
 
         return assembly(self.spec(), progress)
 
     def assembly_report(self, progress: Progress | None = None) -> AssemblyReport:
-        """Make the assembly if it isn't yet, and say what it is; nothing is written."""
+        """Make the assembly if it isn't yet, and say what it is; nothing is written.
+
+        Examples
+        --------
+        >>> Lattice((3, 2, 1), 10, thickness=0.8).assembly_report().instances
+        6
+        """
         from gyroid_cad.builds.assembly import assembly_report
 
         return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
-        """Tell whether files with these endings need the solid: triangles of whole patches do not."""
+        """Tell whether files with these endings need the solid: triangles of whole patches do not.
+
+        Examples
+        --------
+        >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
+        >>> lattice.needs_solid(["cell.stl"]), lattice.needs_solid(["cell.stl", "cell.step"])
+        (False, True)
+        """
         return bool(self.trim) or any(format_of(path) not in TRIANGLE_FORMATS for path in paths)
-
-    def triangles(self, deviation: float | None = None, progress: Progress | None = None) -> Triangles:
-        """The triangles behind STL and 3MF files of whole patches; no kernel is asked.
-
-        Parameters
-        ----------
-        deviation : float, optional
-            As of :meth:`write`.
-        progress : callable, optional
-            Called with (stage, done, total).
-
-        Raises
-        ------
-        ParameterError
-            If the lattice is trimmed, or a patch would take too many triangles.
-        FitError
-            If the fit's edges do not meet those of its neighbours.
-        """
-        if self.trim:
-            raise ParameterError(
-                "trim", self.trim, "none: triangles of a trimmed lattice are the kernel's, of its solid"
-            )
-        if deviation is not None:
-            deviation = finite_number("deviation", deviation, _LENGTH)
-            require_meshing(deviation)
-        # The wall first, so that its progress is told.
-        self.fitted(progress)
-        return triangles(self.spec(), self._deviation(deviation), progress)
-
-    def triangle_report(self, deviation: float | None = None, progress: Progress | None = None) -> TriangleReport:
-        """Make the triangles if they aren't yet, and say what they are; nothing is written."""
-        made = self.triangles(deviation, progress)
-        with timed(made.seconds, "report", progress):
-            measures = (self.wall_thickness, self.volume_fraction, self.exact_volume)
-        return triangle_report(made, *measures)
-
-    def hexahedra(self, subdivisions: int, layers: int = 1, order: int = 1, full: bool = False) -> Mesh:
-        """The wall as structured hexahedra that share their nodes; no kernel is asked.
-
-        Parameters
-        ----------
-        subdivisions : int
-            Elements along each side of a patch; a gyroid's cell has 24 patches.
-        layers : int
-            Across the wall.
-        order : {1, 2}
-            Elements of 8 nodes, or of 20.
-        full : bool
-            Quadratic elements of 27 nodes.
-
-        Returns
-        -------
-        Mesh
-            Which :meth:`gyroid_cad.Mesh.write` puts into files and :func:`gyroid_cad.mesh_quality` measures.
-
-        Raises
-        ------
-        ParameterError
-            Also if memory would not do, or an element would be turned inside out.
-        """
-        return hexahedral_mesh(self.fitted(), subdivisions, layers, order, full)
-
-    def quadrilaterals(self, subdivisions: int, order: int = 1, full: bool = False) -> Mesh:
-        """The mid-surface as structured quadrilaterals, as of :meth:`hexahedra`; quadratic ones of 8 nodes, or of 9."""
-        return quadrilateral_mesh(self.fitted(), subdivisions, order, full)
-
-    def volumes(self, degree: int = 1) -> VolumePatches:
-        """The wall as trivariate NURBS patches that share their control points, for isogeometric analysis.
-
-        Parameters
-        ----------
-        degree : {1, 3}
-            Across the wall; 3 along it.
-
-        Returns
-        -------
-        VolumePatches
-            Which :meth:`gyroid_cad.VolumePatches.write` puts into files.
-
-        Raises
-        ------
-        ParameterError
-        """
-        return lattice_volumes(self.fitted(), degree)
-
-    def periodic_pairs(self, mesh: Mesh) -> PeriodicPairs:
-        """Nodes of the lattice's mesh that are one and the same where the next block of cells would join."""
-        return periodic_pairs(mesh, self.cell_size, self.spec().frame.rotation)
 
     def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
         """The lattice drawn, as a PNG file; unless it is trimmed, no kernel is asked. Notebooks show it of themselves.
@@ -345,6 +314,11 @@ class Lattice(LatticeParameters, HostShapes):
         ParameterError
             Also of more cells than a picture could show.
         SelfIntersectionError, FitError, KernelError
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).picture(size=(120, 100))[1:4]
+        b'PNG'
         """
         size, camera = require_view(size, camera)
         if prod(self.cells) > self._most_drawn:
@@ -378,7 +352,13 @@ class Lattice(LatticeParameters, HostShapes):
         return rows
 
     def built(self, progress: Progress | None = None) -> Build:
-        """The build behind the solid and its files; warns of the islands that a cut leaves."""
+        """The build behind the solid and its files; warns of the islands that a cut leaves.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).built().topology.solids
+        1
+        """
         # With it the kernel is loaded, which triangles and meshes do without.
         from gyroid_cad.builds.solid import build
 
@@ -388,9 +368,22 @@ class Lattice(LatticeParameters, HostShapes):
         return made
 
     def fitted(self, progress: Progress | None = None) -> FittedWall:
-        """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked."""
+        """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).fitted().min_thickness
+        0.8
+        """
         return fitted_wall(self.spec(), progress)
 
-    def _deviation(self, given: float | None) -> float:
-        """Largest deviation of triangles, in mm; the usual one if none is given."""
+    def deviation(self, given: float | None = None) -> float:
+        """Return the largest distance of triangles from the faces, in mm: the usual one if none is given.
+
+        Examples
+        --------
+        >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
+        >>> lattice.deviation(), lattice.deviation(0.2)
+        (0.01, 0.2)
+        """
         return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given

@@ -101,7 +101,7 @@ def test_a_lattice_cut_to_its_block_has_the_block_s_share(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["diamond", "primitive"])
 def test_a_part_is_filled(name: str) -> None:
-    filled = fill(cq.Workplane().sphere(5), SIZE, density=0.3, surface=name)
+    filled = fill(cq.Workplane().circle(3).extrude(4), SIZE, density=0.3, surface=name, fit=FitSettings(5))
     assert filled.report.valid
     assert filled.report.closed
     networks = [

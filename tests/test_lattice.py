@@ -225,7 +225,7 @@ def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> Non
 def test_what_cannot_be_written_is_refused_before_anything_is_built(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: list[str], settings: dict[str, Any], words: str
 ) -> None:
-    for function in ("builds.solid.build", "lattice.triangles"):
+    for function in ("builds.solid.build", "builds.meshes.triangles"):
         monkeypatch.setattr(f"gyroid_cad.{function}", lambda *_: pytest.fail("it was built"))
     with pytest.raises(ParameterError) as caught:
         Lattice(**GOOD).write(*(tmp_path / name for name in names), **settings)
@@ -354,7 +354,7 @@ def test_a_lattice_cut_to_its_block_has_exactly_the_block_s_share() -> None:
     ("surface", "density"), [("gyroid", 0.1), ("gyroid", 0.7), ("diamond", 0.3), ("diamond", 0.7), ("primitive", 0.3)]
 )
 def test_a_lattice_cut_to_its_block_is_one_solid_without_the_chips_at_two_corners(surface: str, density: float) -> None:
-    given = {"cells": (1, 1, 1), "cell_size": 8, "density": density, "surface": surface, "fit": FitSettings(6)}
+    given = {"cells": (1, 1, 1), "cell_size": 8, "density": density, "surface": surface, "fit": FitSettings(5)}
     with pytest.warns(IslandsWarning, match=r"2 islands, .* dropped \(keep_islands keeps\)"):
         made = Lattice(**given, trim="box").report()
     with pytest.warns(IslandsWarning, match=r"2 islands, .* left"):

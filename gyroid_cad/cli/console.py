@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gyroid_cad.cli.installation import Diagnosis
     from gyroid_cad.common.tables import Rows
-    from gyroid_cad.printing.print_check import PrintCheck
+    from gyroid_cad.printing.verdict import PrintCheck
 
 __all__ = ["print_check_table", "print_doctor", "print_report", "print_table", "shown_progress"]
 

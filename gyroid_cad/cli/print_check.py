@@ -18,7 +18,7 @@ from gyroid_cad.common.memory import require_libraries
 
 if TYPE_CHECKING:
     from gyroid_cad.common.progress import Progress
-    from gyroid_cad.printing.print_check import PrintCheck
+    from gyroid_cad.printing.verdict import PrintCheck
 
 __all__ = ["check_by", "print_check_command"]
 

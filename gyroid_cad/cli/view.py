@@ -135,10 +135,10 @@ def _of_file(path: Path) -> list[Facets]:
         from gyroid_cad.kernel.reading import read_shape
 
         return [facets_of_shape(read_shape(path))]
-    from gyroid_cad.kernel.coloured import coloured_parts, extent_of
+    from gyroid_cad.kernel.coloured import coloured_parts, diagonal_of
 
     parts = coloured_parts(path)
-    extent = extent_of(parts)
+    extent = diagonal_of(parts)
     return [facets_of_shape(part.shape, part.colours, part.places, extent) for part in parts]
 
 

@@ -48,7 +48,7 @@ class Room:
 
     @property
     def left(self) -> int:
-        """What a user may have."""
+        """Memory that a user may have, in bytes."""
         return max(0, self.free - self.base)
 
 

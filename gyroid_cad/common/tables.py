@@ -31,7 +31,7 @@ def text_table(rows: Sequence[tuple[str, ...]], header: tuple[str, ...] | None =
 
 
 def cells_shown(cells: tuple[int, int, int], cell_size: float, alike: bool = True) -> str:
-    """How many cells there are, and how large; where a scale field or a map changes them, before that."""
+    """Number of cells and their size; where a scale field or a map changes them, before that."""
     counts = " x ".join(map(str, cells))
     return f"{counts}, {cell_size:g} mm each" if alike else f"{counts}, {cell_size:g} mm before scaling or mapping"
 

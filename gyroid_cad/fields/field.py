@@ -58,6 +58,13 @@ class Field:
         Of a field that is the same everywhere.
     parameter : str, optional
         What a user gave it as, where that is not what it is used for.
+
+    Examples
+    --------
+    >>> from gyroid_cad import fields
+    >>> wall = 0.6 + 0.02 * fields.distance_from_point((0, 0, 0))
+    >>> print(wall(3, 4, [0, 12]))
+    [0.7  0.86]
     """
 
     function: Function

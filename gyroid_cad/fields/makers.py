@@ -32,7 +32,13 @@ __all__ = [
 
 
 def constant(value: float) -> Field:
-    """Field of one value everywhere; raises ParameterError if it is not a finite number."""
+    """Field of one value everywhere; raises ParameterError if it is not a finite number.
+
+    Examples
+    --------
+    >>> constant(0.8)(1, 2, [3, 4]).tolist()
+    [0.8, 0.8]
+    """
     number = finite_number("value", value)
     return Field(lambda x, y, z: number, call_text("constant", number), number)
 
@@ -44,6 +50,11 @@ def linear(value: float, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Fiel
     ------
     ParameterError
         If any of them is not a finite number.
+
+    Examples
+    --------
+    >>> linear(0.6, x=0.02)([0, 10], 0, 0).tolist()
+    [0.6, 0.8]
     """
     origin = finite_number("value", value)
     a, b, c = finite_number("x", x), finite_number("y", y), finite_number("z", z)
@@ -56,6 +67,11 @@ def expression(text: str) -> Field:
     """A formula such as ``"0.8 - 0.1*z"``, as :func:`~gyroid_cad.fields.expressions.compile_expression` reads it.
 
     The same text gives the same field. Raises ParameterError at what cannot be used, naming its column.
+
+    Examples
+    --------
+    >>> print(expression("0.8 - 0.1*z")(0, 0, [0, 1]))
+    [0.8 0.7]
     """
     if not isinstance(text, str):
         raise ParameterError("text", text, "an expression of x, y, z as text")
@@ -63,7 +79,13 @@ def expression(text: str) -> Field:
 
 
 def distance_from_point(point: Point) -> Field:
-    """The distance in mm from a point; raises ParameterError if that isn't three finite numbers."""
+    """The distance in mm from a point; raises ParameterError if that isn't three finite numbers.
+
+    Examples
+    --------
+    >>> distance_from_point((0, 0, 12))(3, 4, [0, 12]).tolist()
+    [13.0, 5.0]
+    """
     centre = three_numbers("point", point)
     return Field(_distance(centre), call_text("distance_from_point", centre))
 
@@ -75,6 +97,11 @@ def distance_from_axis(point: Point, direction: Point) -> Field:
     ------
     ParameterError
         If either isn't three finite numbers, or the direction is zero.
+
+    Examples
+    --------
+    >>> distance_from_axis((0, 0, 0), (0, 0, 1))(3, 4, [0, 12]).tolist()
+    [5.0, 5.0]
     """
     through, along = three_numbers("point", point), three_numbers("direction", direction)
     return Field(_distance(through, _unit("direction", along)), call_text("distance_from_axis", through, along))
@@ -104,6 +131,11 @@ def radial(
     ------
     ParameterError
         If anything isn't finite, the radius is not above 0 or the axis is zero.
+
+    Examples
+    --------
+    >>> radial(1.0, 0.5, radius=10)([0, 5, 20], 0, 0).tolist()
+    [1.0, 0.75, 0.5]
     """
     values = finite_number("centre_value", centre_value), finite_number("outer_value", outer_value)
     reach, middle = positive_number("radius", radius), three_numbers("centre", centre)
@@ -123,6 +155,11 @@ def between_planes(first_value: float, second_value: float, first_point: Point, 
     ------
     ParameterError
         If anything isn't finite, or the points are the same.
+
+    Examples
+    --------
+    >>> between_planes(0.5, 1.0, (0, 0, 0), (0, 0, 10))(0, 0, [-5, 5, 20]).tolist()
+    [0.5, 0.75, 1.0]
     """
     values = finite_number("first_value", first_value), finite_number("second_value", second_value)
     start, end = three_numbers("first_point", first_point), three_numbers("second_point", second_point)
@@ -149,6 +186,12 @@ def sampled(axes: Sequence[ArrayLike], values: ArrayLike, method: str | None = N
     Raises
     ------
     ParameterError
+
+    Examples
+    --------
+    >>> field = sampled(([0, 10], [0, 10], [0, 10]), [[[0, 0], [0, 0]], [[1, 1], [1, 1]]])
+    >>> field([0, 5, 20], 0, 0).tolist()
+    [0.0, 0.5, 1.0]
     """
     grid = _grid(axes)
     shape = tuple(len(axis) for axis in grid)
@@ -175,12 +218,23 @@ def smooth_minimum(first: Field | float | str, second: Field | float | str, widt
     ------
     ParameterError
         If the width is not above 0, or one of the two is neither a number, an expression nor a Field.
+
+    Examples
+    --------
+    >>> smooth_minimum("x", 5, width=2)([0, 5, 9], 0, 0).tolist()
+    [0.0, 4.5, 5.0]
     """
     return _blend("smooth_minimum", smooth_lesser, first, second, width)
 
 
 def smooth_maximum(first: Field | float | str, second: Field | float | str, width: float) -> Field:
-    """The greater of two fields, rounded as by :func:`smooth_minimum`."""
+    """The greater of two fields, rounded as by :func:`smooth_minimum`.
+
+    Examples
+    --------
+    >>> smooth_maximum("x", 5, width=2)([0, 5, 9], 0, 0).tolist()
+    [5.0, 5.5, 9.0]
+    """
     return _blend("smooth_maximum", smooth_greater, first, second, width)
 
 

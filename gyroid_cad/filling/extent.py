@@ -70,7 +70,7 @@ class PartExtent:
 
     @cached_property
     def _spread_evenly(self) -> tuple[cKDTree, Floats]:
-        """Those of the points that are looked at, to be found by place, and their normals."""
+        """Points chosen to be looked at, to be found by place, and their normals."""
         cubes = np.round(np.hstack([self._points / (_ONE_IN * self._spacing), self._normals]))
         few = np.unique(cubes, axis=0, return_index=True)[1]
         few = few[np.any(self._normals[few] != 0, axis=1)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,11 +17,11 @@ from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.common.tables import Rows, islands_shown, text_table
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
+from gyroid_cad.filling.report import FillReport
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, grams_of, regions_of, skin_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
@@ -40,96 +40,9 @@ from gyroid_cad.trim.islands import Islands, island_rule
 from gyroid_cad.wall.covering import Frame, frame_of, placement
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
 
-__all__ = ["FillReport", "Filled", "fill"]
+__all__ = ["Filled", "fill"]
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class FillReport:
-    """Report on a filled part.
-
-    Attributes
-    ----------
-    kind : str
-    cell_size, thickness : float
-        In mm; the wall where it is thickest, or for a network twice the distance of its border from the surface.
-    min_wall : float, optional
-        The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a network.
-    skin : float, optional
-        In mm.
-    solids, faces : int
-    valid, closed : bool
-        By the kernel's own check; every edge bounds exactly two faces. The bare surface is not closed.
-    part_volume, volume : float
-        In mm3.
-    density : float
-        Volume by that of the part.
-    area : float
-        Of the surface, in mm2.
-    mass, part_mass : float, optional
-        In g, for a material's density.
-    islands, dropped : int
-        Pieces besides the largest one of each domain, and pieces that were dropped.
-    islands_volume, dropped_volume : float
-        Of either, in mm3; of the bare surface 0.
-    cut_patches, whole_patches : int
-        That the part's boundary may cross, and that lie wholly inside.
-    by_sections : bool
-        Whether the part is a box, and so was cut without the kernel's booleans.
-    shift : tuple of float
-        Of the lattice, in mm, where the kernel did not manage without.
-    seconds : dict
-        By stage.
-    """
-
-    kind: Kind
-    cell_size: float
-    thickness: float
-    min_wall: float | None
-    skin: float | None
-    solids: int
-    faces: int
-    valid: bool
-    closed: bool
-    part_volume: float
-    volume: float
-    density: float
-    area: float
-    mass: float | None
-    part_mass: float | None
-    islands: int
-    islands_volume: float
-    dropped: int
-    dropped_volume: float
-    cut_patches: int
-    whole_patches: int
-    by_sections: bool
-    shift: Point
-    seconds: dict[str, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report as plain values, ready for JSON."""
-        return asdict(self)
-
-    def rows(self) -> Rows:
-        """Subject and finding, line by line, as they are printed."""
-        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
-        of_part = f"{self.part_volume:.8g}, density {self.density:.5f}"
-        return [
-            ("kind", f"{self.kind}, cells of {self.cell_size:g} mm, wall {self.thickness:.6g} mm"),
-            *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
-            *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
-            ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
-            ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
-            ("area", f"{self.area:.6g} mm2"),
-            *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
-            ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
-            *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
-        ]
-
-    def __str__(self) -> str:
-        return text_table(self.rows())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,19 +54,44 @@ class Filled(HostShapes):
     domains : dict
         Shape by name: "sheet", "network-a", "network-b", "surface", or "channel-a" and "channel-b".
     report : FillReport
+
+    Examples
+    --------
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, fill
+    >>> block = cq.Workplane().box(4, 4, 4, centered=False)
+    >>> filled = fill(block, cell_size=8, density=0.3, fit=FitSettings(5))
+    >>> list(filled.domains), filled.report.valid
+    (['sheet'], True)
     """
 
     domains: dict[str, KernelShape]
     report: FillReport
 
     def solid(self) -> KernelShape:
-        """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own."""
+        """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own.
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
+        >>> filled.solid().ShapeType()
+        <TopAbs_ShapeEnum.TopAbs_SOLID: 2>
+        """
 
         shapes = list(self.domains.values())
         return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
 
     def named_solids(self) -> dict[str, KernelShape]:
-        """Shapes by the names of their domains, each under a handle of the caller's own."""
+        """Shapes by the names of their domains, each under a handle of the caller's own.
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
+        >>> list(filled.named_solids())
+        ['sheet']
+        """
         return {name: another_handle(shape) for name, shape in self.domains.items()}
 
     def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
@@ -162,6 +100,13 @@ class Filled(HostShapes):
         Raises
         ------
         ParameterError, ExportError
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
+        >>> filled.picture(size=(120, 100))[1:4]
+        b'PNG'
         """
         return shape_picture(self.solid(), *require_view(size, camera))
 
@@ -177,6 +122,13 @@ class Filled(HostShapes):
         Raises
         ------
         ParameterError
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
+        >>> filled.deviation(), filled.deviation(0.1)
+        (0.008, 0.1)
         """
         usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
         limit = usual if given is None else finite_number("deviation", given)
@@ -196,6 +148,12 @@ class Filled(HostShapes):
         Raises
         ------
         ParameterError, ExportError
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
+        >>> filled.write("light.step", "light.stl", deviation=0.1)
         """
         targets = require_formats(paths)
         limit = self.deviation(deviation)
@@ -280,6 +238,15 @@ def fill(
     KernelError
         If the kernel fails, or gives something that is not closed, not valid, or of the wrong volume; or cannot
         offset the part by its skin.
+
+    Examples
+    --------
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, fill
+    >>> block = cq.Workplane().box(4, 4, 4, centered=False)
+    >>> filled = fill(block, cell_size=8, density=0.3, fit=FitSettings(5))
+    >>> abs(filled.report.density - 0.3) < 0.01
+    True
     """
     frame = frame_of(*placement(origin, rotation))
     grams = None if material_density is None else grams_of(material_density)

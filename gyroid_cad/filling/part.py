@@ -110,7 +110,7 @@ class Filling:
 
     @property
     def cells(self) -> float:
-        """How many cells have the volume of what is filled."""
+        """Number of cells that have the volume of what is filled."""
         return self.core.volume / self.cell_size**3
 
     def run(self, frame: Frame) -> Outcome:

@@ -28,7 +28,7 @@ from gyroid_cad.kernel.compat import LabelSequence, NumberedShapes
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.step import no_messages
 
-__all__ = ["ColouredPart", "OwnColour", "coloured_contents", "coloured_parts", "extent_of"]
+__all__ = ["ColouredPart", "OwnColour", "coloured_contents", "coloured_parts", "diagonal_of"]
 
 # Red, green and blue, 0 to 1, as a screen has them (sRGB); none where the file says nothing.
 OwnColour = tuple[float, float, float] | None
@@ -88,7 +88,7 @@ def coloured_contents(path: str) -> Contents:
     return [part.shape for part in parts], [(part.colours, part.places) for part in parts]
 
 
-def extent_of(parts: Sequence[ColouredPart]) -> float:
+def diagonal_of(parts: Sequence[ColouredPart]) -> float:
     """Diagonal of a box round all parts in all their places, in mm; a little larger than need be."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for part in parts:
@@ -99,7 +99,7 @@ def extent_of(parts: Sequence[ColouredPart]) -> float:
 
 
 class _Occurrences:
-    """Where parts occur, by the entries of their labels and the colours that their occurrences put over them."""
+    """Places of parts, by the entries of their labels and the colours that their occurrences put over them."""
 
     def __init__(self, document: TDocStd_Document) -> None:
         self._colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())

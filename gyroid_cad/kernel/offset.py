@@ -32,9 +32,10 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths
+from gyroid_cad.kernel.ordered import in_order, sorted_by_place
 from gyroid_cad.kernel.processes import Started, started
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
@@ -214,7 +215,9 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
     with closing(_attempts(solid, openings, skin)) as attempts:
         for core in attempts:
             if depths.confirm(core, skin):
-                return core
+                # What goes on from here is the same at every run.
+                ordered = sorted_by_place(map(in_order, core))
+                return ordered if all(is_valid(one) and topology(one).closed for one in ordered) else core
     raise KernelError(f"the kernel cannot offset the part by {skin:g} mm; without a skin it can still be filled")
 
 

@@ -30,13 +30,17 @@ from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.surfaces import translation
-from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners
+from gyroid_cad.mesh.triangles.files import binary_stl_corners, keep_facets, numbered_corners
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.triangulation import parting
 
-__all__ = ["diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
+__all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
+
+# Parts of the deviation that are tried one after the other, until the mesh is closed.
+_FINER = (1.0, 0.5, 0.2, 0.05)
 
 
 def write_meshed_stl(
@@ -46,6 +50,8 @@ def write_meshed_stl(
 
     STL knows nothing but coordinates: where the solid touches itself in a line, four triangles would share an
     edge. There the vertices, which are distinct in the solid, are moved apart by a thousandth of the deviation.
+
+    What the mesher leaves open is meshed again, more finely; what stays open is not written.
 
     Parameters
     ----------
@@ -61,9 +67,38 @@ def write_meshed_stl(
     ------
     ParameterError, ExportError
     """
-    copy = _meshed_copy(shape, path, deviation, angle)
     with replacing(path) as temporary:
-        _write(copy, temporary, path)
+        for finer in _FINER:
+            _write(_meshed_copy(shape, path, deviation * finer, angle), temporary, path)
+            _, triangles, kept = numbered_corners(binary_stl_corners(temporary))
+            if not unmatched_edges(triangles):
+                break
+        else:
+            raise _left_open(path, triangles, deviation)
+        keep_facets(temporary, kept)
+
+
+def closed_triangles(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
+    """Triangles of a solid as :func:`meshed` makes them, and more finely where those are open.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    for finer in _FINER:
+        vertices, triangles = meshed(shape, path, deviation * finer, angle)
+        if not unmatched_edges(triangles):
+            return vertices, triangles
+    raise _left_open(path, triangles, deviation)
+
+
+def _left_open(path: str | os.PathLike[str], triangles: NDArray[np.integer], deviation: float) -> ExportError:
+    return ExportError(
+        f"{path} was not written: with deviation = {deviation:g} mm, and with less, the kernel's mesher leaves "
+        f"{unmatched_edges(triangles)} edges that two triangles do not share; another deviation may do"
+    )
 
 
 def meshed(

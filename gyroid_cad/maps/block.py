@@ -40,6 +40,14 @@ class Cylinder:
     angle : float, optional
         In degrees, above 0 to 360: what the block's whole x extent takes up. If left out, lengths along x are
         kept on the cylinder of that radius. A block that takes up the full turn is joined to itself.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> from gyroid_cad.maps import Cylinder
+    >>> ring = Lattice((8, 1, 1), 10, thickness=0.8, map=Cylinder(radius=16, angle=360))
+    >>> str(ring.map)
+    'cylinder:radius=16.0,angle=360.0'
     """
 
     radius: float
@@ -85,6 +93,14 @@ class Sphere:
         In mm.
     angle : float, optional
         In degrees of longitude, above 0 to 360: what the block's whole x extent takes up, as of a cylinder.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> from gyroid_cad.maps import Sphere
+    >>> cap = Lattice((2, 2, 1), 10, thickness=0.8, map=Sphere(radius=30))
+    >>> str(cap.map)
+    'sphere:radius=30.0'
     """
 
     radius: float
@@ -134,6 +150,13 @@ class Twist:
     ----------
     angle : float
         In degrees, from the block's bottom to its top; a hundred turns at most.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> from gyroid_cad.maps import Twist
+    >>> Lattice((1, 1, 2), 10, thickness=0.8, map=Twist(angle=30)) == Lattice((1, 1, 2), 10, 0.8, map="twist:angle=30")
+    True
     """
 
     angle: float
@@ -174,6 +197,14 @@ class Bend:
     ----------
     angle : float
         In degrees, not 0, from -360 to 360: between the block's two ends along x. Negative bends the ends down.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> from gyroid_cad.maps import Bend
+    >>> bent = Lattice((2, 1, 1), 10, thickness=0.8, map=Bend(angle=40))
+    >>> bent.uniform
+    False
     """
 
     angle: float

@@ -58,6 +58,15 @@ class SpaceMap:
     Raises
     ------
     ParameterError
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice
+    >>> from gyroid_cad.maps import SpaceMap
+    >>> sheared = SpaceMap(lambda x, y, z: (x + 0.2 * z, y, z), text="sheared")
+    >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8, map=sheared)
+    >>> print(lattice.map)
+    sheared
     """
 
     function: MapFunction

@@ -35,6 +35,13 @@ class Printer:
         Of walls that stand free at an edge.
     min_drain_hole : float
         Diameter.
+
+    Examples
+    --------
+    >>> from gyroid_cad import Lattice, Printer, print_check
+    >>> mine = Printer("mine", "Mine", "resin", (80, 80, 80), 0.4, 0.6, 3.5)
+    >>> print_check(Lattice((1, 1, 1), 10, thickness=0.8), mine).fits
+    True
     """
 
     key: str

@@ -18,8 +18,9 @@ from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.printing.print_check import PrintCheck, print_check
+from gyroid_cad.printing.print_check import print_check
 from gyroid_cad.printing.printers import printer_named
+from gyroid_cad.printing.verdict import PrintCheck
 from gyroid_cad.render.facets import Facets, facets_of_shape, facets_of_wall
 from gyroid_cad.report.file_sections import FileContents, file_section, read_contents
 from gyroid_cad.report.pores import ChannelSpheres, pores_of

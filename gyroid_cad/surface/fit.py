@@ -66,6 +66,12 @@ class FitSettings:
     Raises
     ------
     ParameterError
+
+    Examples
+    --------
+    >>> from gyroid_cad import FitSettings
+    >>> FitSettings(14).control_points, FitSettings.paper().parameterisation
+    (14, 'polar')
     """
 
     control_points: int = 10

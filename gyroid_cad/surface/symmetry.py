@@ -144,7 +144,7 @@ class Placements:
         )
 
     def joined(self, *others: Placements) -> Placements:
-        """These placements and those of others after them."""
+        """Join these placements and those of others after them."""
         every = (self, *others)
         return Placements(
             self.patch,

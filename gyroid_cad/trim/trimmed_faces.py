@@ -270,7 +270,7 @@ class _Cutting:
         return arcs
 
     def _in_box(self, arcs: list[list[Arc]]) -> list[list[Arc]]:
-        """Those of each face's arcs whose middle lies in the box, all in one look."""
+        """Arcs of each face whose middle lies in the box, all in one look."""
         flat = [arc for some in arcs for arc in some]
         face = np.repeat(np.arange(len(arcs)), [len(some) for some in arcs])
         middle = np.array([(arc.first + arc.last) / 2 for arc in flat])

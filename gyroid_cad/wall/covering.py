@@ -122,7 +122,7 @@ class BoxExtent:
         return np.asarray(self._outside(points) <= reach)
 
     def _outside(self, points: Floats) -> Floats:
-        """How far the points are beyond the side that they are furthest beyond, in mm; below 0 inside."""
+        """Distance of the points beyond the side that they are furthest beyond, in mm; below 0 inside."""
         return np.asarray(np.maximum(np.array(self.low) - points, points - np.array(self.high)).max(axis=-1))
 
 

@@ -230,6 +230,12 @@ class LatticeParameters:
         Raises
         ------
         ParameterError
+
+        Examples
+        --------
+        >>> lattice = Lattice.paper((1, 1, 1), thickness_factor=0.16, scale=5)
+        >>> lattice.cell_size, lattice.thickness
+        (10.0, 0.8)
         """
         given = paper_units(thickness_factor, bc_length, scale)
         return cls(
@@ -246,18 +252,36 @@ class LatticeParameters:
 
     @property
     def minimal_surface(self) -> MinimalSurface:
-        """The surface of that name, from the table of families."""
+        """The surface of that name, from the table of families.
+
+        Examples
+        --------
+        >>> len(Lattice((1, 1, 1), 10, thickness=0.8, surface="diamond").minimal_surface.cell)
+        48
+        """
         return surface_named(self.surface)
 
     @property
     def uniform(self) -> bool:
-        """True where every cell is like every other."""
+        """True where every cell is like every other.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness="0.8 + 0.01*x").uniform
+        False
+        """
         varying = isinstance(self.thickness, Field) or isinstance(self.density, Field)
         return not varying and self.scale_field is None and self.map is None
 
     @property
     def wall_thickness(self) -> float:
-        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice is graded."""
+        """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice is graded.
+
+        Examples
+        --------
+        >>> round(Lattice((1, 1, 1), 10, density=0.3).wall_thickness, 3)
+        0.983
+        """
         if not self.uniform:
             return self._measures().mean_thickness
         if self.density is None:
@@ -266,7 +290,13 @@ class LatticeParameters:
 
     @property
     def volume_fraction(self) -> float:
-        """The density, whichever of thickness and density was given; the whole block's where the lattice is graded."""
+        """The density, whichever of thickness and density was given; the whole block's where the lattice is graded.
+
+        Examples
+        --------
+        >>> round(Lattice((1, 1, 1), 10, thickness=0.8).volume_fraction, 4)
+        0.2452
+        """
         if not self.uniform:
             return self.exact_volume / block_volume(self.cells, self.grading())
         if self.density is None:
@@ -275,31 +305,42 @@ class LatticeParameters:
 
     @property
     def exact_volume(self) -> float:
-        """Volume in mm3 of the exact lattice, by the tube formula, or by quadrature where it varies."""
+        """Volume in mm3 of the exact lattice, by the tube formula, or by quadrature where it varies.
+
+        Examples
+        --------
+        >>> round(Lattice((2, 1, 1), 10, density=0.3).exact_volume, 6)
+        600.0
+        """
         if not self.uniform:
             return self._measures().volume
         return prod(self.cells) * self.volume_fraction * self.cell_size**3
 
     def spec(self) -> LatticeSpec:
-        """Return what is to be built."""
+        """Return what is to be built.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8, tolerance=1e-6).spec().settings.control_points
+        14
+        """
         settings = self.fit
         if self.uniform and self.tolerance is not None:
             settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
         tolerance = self.tolerance or USUAL_TOLERANCE
         trimmed = self.trim is not None
         return LatticeSpec(
-            self.cells,
-            self.grading(),
-            settings,
-            tolerance,
-            trimmed,
-            self.keep_islands,
-            self.origin,
-            self.rotation,
+            self.cells, self.grading(), settings, tolerance, trimmed, self.keep_islands, self.origin, self.rotation
         )
 
     def grading(self) -> Grading:
-        """Return how wall and space vary, or that they do not."""
+        """Return how wall and space vary, or that they do not.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).grading().uniform
+        True
+        """
         if self.uniform:
             return Grading(self.cell_size, self.wall_thickness, surface=self.minimal_surface)
         space = None if self.map is None else space_over(self.map, self.cells, self.cell_size)  # type: ignore[arg-type]

@@ -295,10 +295,10 @@ class _Lookup:
 
 
 def _meeting_factor(apart: Floats, half: Floats, other_reach: Floats) -> Floats:
-    """By what two walls are to be scaled so that they just touch: the least s for which one, up to s half, comes
-    within s other_reach of the other's place on its mid-surface.
+    """Factor by which two walls are to be scaled so that they just touch.
 
-    That is where its tip does, |apart - s half| = s other_reach, unless the tip has passed the place before.
+    It is the least s for which one, up to s half, comes within s other_reach of the other's place on its mid-surface:
+    where its tip does, |apart - s half| = s other_reach, unless the tip has passed the place before.
     """
     squared, along, own = dot(apart, apart), dot(apart, half), dot(half, half)
     foot = np.maximum(along / own, 0)

@@ -82,7 +82,7 @@ def test_while_a_large_file_is_written_nothing_of_it_is_left(tmp_path: Path, nam
 def test_while_the_kernel_writes_step_both_its_temporary_files_go(tmp_path: Path) -> None:
     # It hears of the interrupt when its writer returns.
     (tmp_path / "a.step").write_text("older")
-    run = started(tmp_path, "build", "-o", "a.step", "--cells", "3", "3", "2", *LARGE[4:])
+    run = started(tmp_path, "build", "-o", "a.step", "--cells", "2", "2", "2", *LARGE[4:])
     wait_for_partial(run, tmp_path)
     interrupted(run)
     only_the_older_file(tmp_path, "a.step")
@@ -93,7 +93,7 @@ def test_killed_while_the_kernel_writes_step_it_leaves_neither_temporary_file(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     (tmp_path / "a.step").write_text("older")
-    run = started(tmp_path, "build", "-o", "a.step", "--cells", "3", "3", "2", *LARGE[4:])
+    run = started(tmp_path, "build", "-o", "a.step", "--cells", "2", "2", "2", *LARGE[4:])
     wait_for_partial(run, tmp_path)
     run.send_signal(number)
     assert run.communicate(timeout=PATIENCE) == ("", "")

@@ -10,7 +10,7 @@ from OCP.TopAbs import TopAbs_FACE
 
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of, topology
-from gyroid_cad.kernel.coloured import ColouredPart, OwnColour, coloured_parts, extent_of
+from gyroid_cad.kernel.coloured import ColouredPart, OwnColour, coloured_parts, diagonal_of
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import write_step
 
@@ -101,7 +101,7 @@ def test_a_file_that_says_nothing_of_colours_holds_its_shape_whole(tmp_path: Pat
     (part,) = coloured_parts(tmp_path / "plain.step")
     assert part.colours == (None,) * 6
     assert topology(part.shape).solids == 1
-    assert extent_of([part]) == pytest.approx(14**0.5, abs=1e-3)
+    assert diagonal_of([part]) == pytest.approx(14**0.5, abs=1e-3)
 
 
 def test_what_is_no_step_file_is_an_export_error(tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ import trimesh
 
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.printing.print_check import PrintCheck, print_check, trapped_voids
+from gyroid_cad.printing.print_check import print_check, trapped_voids
 from gyroid_cad.printing.printers import printer_named
+from gyroid_cad.printing.verdict import PrintCheck
 from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.complex import build_complex

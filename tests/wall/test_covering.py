@@ -89,7 +89,7 @@ def test_what_lies_inside_a_ball_or_outside_is_told_from_what_it_crosses(
 
 
 def test_patches_well_inside_need_no_cutting() -> None:
-    middle, radius = np.zeros(3), 5 * L
+    middle, radius = np.zeros(3), 2 * L
     complex = covering_complex(middle - radius, middle + radius, STRAIGHT, L, REACH)
     sides = patch_sides(complex, sampled(complex, STRAIGHT), REACH, *ball(middle, radius))
     farthest = np.linalg.norm(sampled(complex, STRAIGHT, DENSE), axis=-1).max(axis=1)

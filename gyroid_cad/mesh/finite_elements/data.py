@@ -74,7 +74,14 @@ class MeshData:
                 array.setflags(write=False)
 
     def rows(self) -> Rows:
-        """Subject and finding, line by line, as they are printed."""
+        """Subject and finding, line by line, as they are printed.
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> mesh.rows()[0]
+        ('elements', '288 hexahedron: 2 x 2 a patch, 3 across the wall')
+        """
         n, across = self.subdivisions, f"{self.layers} across the wall" if self.layers else "of the mid-surface"
         return [
             ("elements", f"{len(self.cells):,} {self.element.name}: {n} x {n} a patch, {across}"),
@@ -87,22 +94,51 @@ class MeshData:
 
     @property
     def element_patch(self) -> Integers:
-        """Patch of each element; shape (elements,)."""
+        """Patch of each element; shape (elements,).
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> int(mesh.element_patch.max())
+        23
+        """
         return np.arange(len(self.cells)) // (max(self.layers, 1) * self.subdivisions**2)
 
     @property
     def element_layer(self) -> Integers:
-        """Layer of each element, from face B on; shape (elements,)."""
+        """Layer of each element, from face B on; shape (elements,).
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> mesh.element_layer[:12].tolist()
+        [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2]
+        """
         return np.arange(len(self.cells)) // self.subdivisions**2 % max(self.layers, 1)
 
     @property
     def columns(self) -> tuple[Integers, Integers]:
-        """At which place of the patches' grid, and at which level across the wall, each node stands; shape (nodes,)."""
+        """At which place of the patches' grid, and at which level across the wall, each node stands; shape (nodes,).
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> place, level = mesh.columns
+        >>> level[:5].tolist()
+        [0, 1, 2, 3, 0]
+        """
         numbers = np.arange(len(self.points)) if self.kept is None else self.kept
         return np.divmod(numbers, self.levels)
 
     def surfaces(self) -> dict[str, Surface]:
-        """Faces A and B of the wall and its free side walls, as faces of elements; empty of a mid-surface."""
+        """Faces A and B of the wall and its free side walls, as faces of elements; empty of a mid-surface.
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> {name: len(surface.elements) for name, surface in mesh.surfaces().items()}
+        {'FACE_A': 96, 'FACE_B': 96, 'FREE_WALLS': 216}
+        """
         if not self.layers:
             return {}
         n = self.subdivisions
@@ -118,15 +154,36 @@ class MeshData:
         }
 
     def surface_nodes(self, surface: Surface) -> Integers:
-        """Nodes of every face of a surface, outwards; shape (faces, nodes of a face)."""
+        """Nodes of every face of a surface, outwards; shape (faces, nodes of a face).
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> mesh.surface_nodes(mesh.surfaces()["FACE_A"]).shape
+        (96, 4)
+        """
         return np.asarray(self.cells[surface.elements[:, np.newaxis], self.element.faces[surface.faces]])
 
     def node_sets(self) -> dict[str, Integers]:
-        """Nodes on the surfaces, by their names, ascending."""
+        """Nodes on the surfaces, by their names, ascending.
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> list(mesh.node_sets())
+        ['FACE_A', 'FACE_B', 'FREE_WALLS']
+        """
         return {name: np.unique(self.surface_nodes(surface)) for name, surface in self.surfaces().items()}
 
     def element_sets(self) -> dict[str, Integers]:
-        """Elements by bounding cell, cubic cell and layer: the colours of the paper's Fig. 11."""
+        """Elements by bounding cell, cubic cell and layer: the colours of the paper's Fig. 11.
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2, layers=3)
+        >>> list(mesh.element_sets())
+        ['BC_1', 'BC_2', 'BC_3', 'BC_4', 'CC_1_1_1', 'LAYER_1', 'LAYER_2', 'LAYER_3']
+        """
         patch, layer = self.element_patch, self.element_layer
         bounding_cell = self.complex.placements.bounding_cell[self.complex.patch_placement]
         cell, cell_of_patch = np.unique(self.complex.patch_cell, axis=0, return_inverse=True)

@@ -87,6 +87,11 @@ class Mesh(MeshData):
         Raises
         ------
         ParameterError, ExportError
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2)
+        >>> mesh.write("cell.inp", "cell.vtu")
         """
         write_mesh_files(self, paths, pairs, progress)
 

@@ -74,7 +74,14 @@ class VolumeData:
         freeze_arrays(self)
 
     def rows(self) -> Rows:
-        """Subject and finding, line by line, as they are printed."""
+        """Subject and finding, line by line, as they are printed.
+
+        Examples
+        --------
+        >>> volumes = Lattice((1, 1, 1), 10, thickness=0.8).volumes()
+        >>> volumes.rows()[0]
+        ('patches', '24 of degrees 3, 3, 1')
+        """
         return [
             ("patches", f"{len(self):,} of degrees {', '.join(map(str, self.degrees))}"),
             ("control points", f"{len(self.control_points):,}"),
@@ -89,16 +96,37 @@ class VolumeData:
 
     @property
     def degrees(self) -> tuple[int, int, int]:
-        """Along u, v and w."""
+        """Along u, v and w.
+
+        Examples
+        --------
+        >>> volumes = Lattice((1, 1, 1), 10, thickness=0.8).volumes()
+        >>> volumes.degrees
+        (3, 3, 1)
+        """
         along = len(self.knots) - len(self.weights) - 1
         return along, along, int(self.weights.shape[2]) - 1
 
     @property
     def rational(self) -> bool:
-        """True where the weights differ, so that the patches are not polynomial."""
+        """True where the weights differ, so that the patches are not polynomial.
+
+        Examples
+        --------
+        >>> volumes = Lattice((1, 1, 1), 10, thickness=0.8).volumes()
+        >>> volumes.rational
+        False
+        """
         return bool(np.ptp(self.weights) > 0)
 
     def patch(self, index: int) -> NurbsVolume:
-        """One patch as a volume of its own."""
+        """One patch as a volume of its own.
+
+        Examples
+        --------
+        >>> volumes = Lattice((1, 1, 1), 10, thickness=0.8).volumes()
+        >>> volumes.patch(0).evaluate(0.0, 0.0, 0.5).shape
+        (3,)
+        """
         points = self.control_points[self.patch_points[index]]
         return NurbsVolume(points, self.weights, self.knots, self.knots, self.knots_across)

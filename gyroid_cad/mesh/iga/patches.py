@@ -105,6 +105,11 @@ class VolumePatches(VolumeData):
             If an ending is unknown or a file cannot be put there.
         ExportError
             If writing failed.
+
+        Examples
+        --------
+        >>> volumes = Lattice((1, 1, 1), 10, thickness=0.8).volumes()
+        >>> volumes.write("cell.xml", "cell.mesh")
         """
         write_volume_files(self, paths, progress)
 
@@ -128,6 +133,11 @@ class VolumePatches(VolumeData):
             If the values are not one for each control point, or a file cannot be put there.
         ExportError
             If writing failed.
+
+        Examples
+        --------
+        >>> volumes = Lattice((1, 1, 1), 10, thickness=0.8).volumes()
+        >>> volumes.write_field(volumes.control_points[:, 2], "height.gf")
         """
         write_field_files(self, values, paths)
 

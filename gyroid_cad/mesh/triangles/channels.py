@@ -58,7 +58,7 @@ def way_out(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> t
 
     >>> corners = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
     >>> low = np.array([[0, 1, 3], [0, 3, 2], [0, 4, 5], [0, 5, 1], [0, 2, 6], [0, 6, 4]])
-    >>> way_out(corners, np.concatenate([low, 7 - low]))[0] is None
+    >>> way_out(corners, np.concatenate([low, 7 - low[:, ::-1]]))[0] is None
     True
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)

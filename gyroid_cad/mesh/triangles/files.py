@@ -16,7 +16,7 @@ from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, require_format
 from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["binary_stl_corners", "numbered_corners", "read_triangles"]
+__all__ = ["binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -81,6 +81,13 @@ def _stl_corners(path: Path) -> Floats:
 def binary_stl_corners(path: Path) -> NDArray[np.float32]:
     """Read the corners of all triangles of a binary STL file; shape (triangles, 3, 3)."""
     return np.asarray(np.fromfile(path, _RECORD, offset=_HEADER_BYTES)["corners"])
+
+
+def keep_facets(path: Path, kept: Booleans) -> None:
+    """Rewrite a binary STL file without the triangles that a mask, shape (triangles,), leaves out."""
+    if not kept.all():
+        header, records = path.read_bytes()[: _HEADER_BYTES - 4], np.fromfile(path, _RECORD, offset=_HEADER_BYTES)[kept]
+        path.write_bytes(header + len(records).to_bytes(4, "little") + records.tobytes())
 
 
 def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, Booleans]:

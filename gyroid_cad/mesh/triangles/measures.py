@@ -13,7 +13,7 @@ from gyroid_cad.common.arrays import dot, freeze_arrays
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import GyroidError
 
-__all__ = ["TriangleMeasures", "measured_walls", "surface_places", "triangle_measures"]
+__all__ = ["TriangleMeasures", "measured_walls", "surface_places", "triangle_measures", "unmatched_edges"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -88,6 +88,34 @@ class TriangleMeasures:
         return int(np.sum(self.inwards & ~self.inside))
 
 
+def unmatched_edges(triangles: NDArray[np.integer]) -> int:
+    """Count edges that are not used by two triangles, once each way; none of a closed surface that is a manifold.
+
+    Parameters
+    ----------
+    triangles : ndarray of int, shape (triangles, 3)
+
+    Examples
+    --------
+    >>> tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    >>> unmatched_edges(tetrahedron), unmatched_edges(tetrahedron[1:])
+    (0, 3)
+    """
+    _, _, one_way, uses = _edge_uses(np.asarray(triangles, dtype=np.int64))
+    return int(np.sum((uses != 2) | (one_way != 1)))
+
+
+def _edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
+    """Edges in an order that brings uses of one together, where each begins there, and how often it is used one way."""
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
+    forward = edges[:, 0] < edges[:, 1]
+    keys = edges.min(axis=1) * (int(facets.max(initial=0)) + 1) + edges.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    first = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))
+    return order, first, one_way, uses
+
+
 def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> TriangleMeasures:
     """Measure triangles: their size, whether they close, and what they enclose.
 
@@ -103,14 +131,10 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     TriangleMeasures
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
-    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
-    forward = edges[:, 0] < edges[:, 1]
-    keys = edges.min(axis=1) * len(points) + edges.max(axis=1)
-    order = np.argsort(keys, kind="stable")
-    same, owner = keys[order][1:] == keys[order][:-1], order // 3
+    order, first, one_way, uses = _edge_uses(facets)
+    owner, same = order // 3, np.ones(max(len(order) - 1, 0), dtype=np.bool_)
+    same[first[1:] - 1] = False
     labels = connected(len(facets), owner[:-1][same], owner[1:][same])
-    first = np.flatnonzero(np.concatenate([[True], ~same]))
-    one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))
     opened = 2 * one_way != uses
     # Near the triangles, so that volumes far from the origin lose no digits.
     a, b, c = np.moveaxis(points[facets] - points.mean(axis=0), 1, 0)

@@ -6,8 +6,10 @@ import ctypes
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from io import BytesIO
 from typing import Any
+from uuid import NAMESPACE_OID, uuid5
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,13 +49,20 @@ def write_3mf(vertices: NDArray[np.float32], triangles: NDArray[np.int32], path:
     model.SetUnit(lib3mf.ModelUnit.MilliMeter)
     mesh = model.AddMeshObject()
     mesh.SetName("gyroid_cad")
-    corners = (lib3mf.Position * len(vertices)).from_buffer(np.array(vertices, dtype="<f4", order="C"))
-    facets = (lib3mf.Triangle * len(triangles)).from_buffer(np.array(triangles, dtype="<u4", order="C"))
+    places = np.array(vertices, dtype="<f4", order="C")
+    numbers = np.array(triangles, dtype="<u4", order="C")
+    corners = (lib3mf.Position * len(vertices)).from_buffer(places)
+    facets = (lib3mf.Triangle * len(triangles)).from_buffer(numbers)
     try:
         mesh.SetGeometry(corners, facets)
         if not mesh.IsManifoldAndOriented():
             raise ExportError(f"{path} was not written: its triangles are not closed and oriented")
-        model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
+        item = model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
+        # The library draws lots for them; so the same mesh makes the same file.
+        content = sha256(places.tobytes())
+        content.update(numbers.tobytes())
+        for name, set_identity in (("object", mesh.SetUUID), ("item", item.SetUUID), ("build", model.SetBuildUUID)):
+            set_identity(str(uuid5(NAMESPACE_OID, f"{name} {content.hexdigest()}")))
         writer = model.QueryWriter("3mf")
         writer.SetDecimalPrecision(_DECIMALS)
         package = _written(writer)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import zipfile
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -119,3 +120,19 @@ def test_a_trimmed_lattice_is_written_from_the_kernels_triangles(tmp_path: Path)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(lattice.report().volume, rel=2e-2)
     np.testing.assert_allclose([vertices.min(axis=0), vertices.max(axis=0)], [[0, 0, 0], [10, 10, 10]], atol=1e-5)
+
+
+@SUBJECTS
+def test_the_same_mesh_makes_the_same_file_and_another_one_has_other_identities(
+    made: Callable[[], Triangulation], tmp_path: Path
+) -> None:
+    vertices, triangles = indexed_triangles(made())
+    paths = [tmp_path / name for name in ("a.3mf", "b.3mf", "c.3mf")]
+    for path, scale in zip(paths, (1, 1, 2), strict=True):
+        write_3mf(scale * vertices, triangles, path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    identities = [
+        re.findall(r'UUID="([^"]+)"', zipfile.ZipFile(path).read("3D/3dmodel.model").decode()) for path in paths[1:]
+    ]
+    assert len(set(identities[0])) == len(identities[0]) == 3
+    assert set(identities[0]).isdisjoint(identities[1])

@@ -141,7 +141,7 @@ def spread(surface: NurbsSurface, u: Floats, v: Floats) -> tuple[Floats, Floats]
 
 def projected(surface: NurbsSurface, points: Floats, u: Floats, v: Floats) -> Floats:
     """Distances to the surface's nearest places, by Gauss-Newton steps kept in its domain."""
-    for _ in range(12):
+    for _ in range(8):
         d = surface.derivatives(u, v)
         jacobian = np.stack([d[1, 0], d[0, 1]], axis=-1)
         step = np.linalg.solve(
@@ -219,8 +219,8 @@ def test_the_deviation_and_the_missing_volume_fall_with_the_square_of_the_steps(
 
 
 def test_what_corners_are_laid_off_falls_with_the_deviation_and_makes_up_the_volume() -> None:
-    wall = Lattice((2, 1, 1), L, 0.8).wall()
-    deviations = np.array([0.1, 0.01, 0.001])
+    wall = Lattice((1, 1, 1), L, 0.8).wall()
+    deviations = np.array([0.1, 0.02, 0.004])
     made = [triangulated(wall, deviation) for deviation in deviations.tolist()]
     volume_offset = [triangulation.volume_offset for triangulation in made]
     assert np.polyfit(np.log(deviations), np.log(volume_offset), 1)[0] == pytest.approx(1, abs=0.15)

@@ -1,0 +1,112 @@
+"""Report on a filled part: its size, its mass, and how it was made."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.choices import Kind
+from gyroid_cad.common.tables import Rows, islands_shown, text_table
+
+__all__ = ["FillReport"]
+
+
+@dataclass(frozen=True, slots=True)
+class FillReport:
+    """Report on a filled part.
+
+    Attributes
+    ----------
+    kind : str
+    cell_size, thickness : float
+        In mm; the wall where it is thickest, or for a network twice the distance of its border from the surface.
+    min_wall : float, optional
+        The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a network.
+    skin : float, optional
+        In mm.
+    solids, faces : int
+    valid, closed : bool
+        By the kernel's own check; every edge bounds exactly two faces. The bare surface is not closed.
+    part_volume, volume : float
+        In mm3.
+    density : float
+        Volume by that of the part.
+    area : float
+        Of the surface, in mm2.
+    mass, part_mass : float, optional
+        In g, for a material's density.
+    islands, dropped : int
+        Pieces besides the largest one of each domain, and pieces that were dropped.
+    islands_volume, dropped_volume : float
+        Of either, in mm3; of the bare surface 0.
+    cut_patches, whole_patches : int
+        That the part's boundary may cross, and that lie wholly inside.
+    by_sections : bool
+        Whether the part is a box, and so was cut without the kernel's booleans.
+    shift : tuple of float
+        Of the lattice, in mm, where the kernel did not manage without.
+    seconds : dict
+        By stage.
+
+    Examples
+    --------
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, fill
+    >>> block = cq.Workplane().box(4, 4, 4, centered=False)
+    >>> print(fill(block, cell_size=8, density=0.3, fit=FitSettings(5)).report)
+    kind           sheet, cells of 8 mm, wall 0.786642 mm
+    smallest wall  0.786642 mm
+    solids, faces  1, 30 (valid and closed)
+    volume         19.093981 mm3 of 64, density 0.29834
+    area           69.9694 mm2
+    islands        0 left, 2 dropped (0.1075 mm3)
+    """
+
+    kind: Kind
+    cell_size: float
+    thickness: float
+    min_wall: float | None
+    skin: float | None
+    solids: int
+    faces: int
+    valid: bool
+    closed: bool
+    part_volume: float
+    volume: float
+    density: float
+    area: float
+    mass: float | None
+    part_mass: float | None
+    islands: int
+    islands_volume: float
+    dropped: int
+    dropped_volume: float
+    cut_patches: int
+    whole_patches: int
+    by_sections: bool
+    shift: Point
+    seconds: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report as plain values, ready for JSON."""
+        return asdict(self)
+
+    def rows(self) -> Rows:
+        """Subject and finding, line by line, as they are printed."""
+        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
+        of_part = f"{self.part_volume:.8g}, density {self.density:.5f}"
+        return [
+            ("kind", f"{self.kind}, cells of {self.cell_size:g} mm, wall {self.thickness:.6g} mm"),
+            *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
+            *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
+            ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
+            ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
+            ("area", f"{self.area:.6g} mm2"),
+            *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
+            ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
+            *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
+        ]
+
+    def __str__(self) -> str:
+        return text_table(self.rows())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -84,8 +85,48 @@ _MODULES = {
 }
 
 
+# Words of a line of the shell, quotes and all.
+_WORD = re.compile(r'(?:[^\s"]|"[^"]*")+')
+
+
+class ExampleFormatter(click.HelpFormatter):
+    """Formatter whose examples, which are lines to be pasted into a shell, go on in the next line as shells have it."""
+
+    def write_text(self, text: str) -> None:
+        width = self.width - self.current_indent
+        super().write_text("\n".join(_wrapped(line, width) for line in text.splitlines()))
+
+
+def _wrapped(line: str, width: int) -> str:
+    """Break a line of the shell between options, where it is too long."""
+    if not line.startswith(PROGRAM) or len(line) <= width:
+        return line
+    # An option stays beside its values.
+    parts: list[str] = []
+    for word in _WORD.findall(line):
+        if parts and not word.startswith(("-", ">")):
+            parts[-1] += f" {word}"
+        else:
+            parts.append(word)
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if len(f"{lines[-1]} {part} \\") <= width:
+            lines[-1] += f" {part}"
+        else:
+            lines.append(f"    {part}")
+    return " \\\n".join(lines)
+
+
+class ExampleContext(click.Context):
+    """Context of commands whose help has examples."""
+
+    formatter_class = ExampleFormatter
+
+
 class Commands(click.Group):
     """Group of commands, each loaded when it is asked for: none waits for what another one needs."""
+
+    context_class = ExampleContext
 
     def list_commands(self, context: click.Context) -> list[str]:
         return list(_MODULES)
@@ -94,6 +135,7 @@ class Commands(click.Group):
         if name not in self.commands and name in _MODULES:
             module = import_module(f"gyroid_cad.cli.{_MODULES[name]}")
             command: click.Command = getattr(module, f"{name.replace('-', '_')}_command")
+            command.context_class = ExampleContext
             debug_option(command)
             self.add_command(command, name)
         return self.commands.get(name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["Rows", "cells_shown", "islands_shown", "text_table", "volume_shown", "wall_shown"]
+__all__ = ["Rows", "cell_shown", "cells_shown", "islands_shown", "text_table", "volume_shown", "wall_shown"]
 
 Rows = list[tuple[str, str]]
 
@@ -34,6 +34,15 @@ def cells_shown(cells: tuple[int, int, int], cell_size: float, alike: bool = Tru
     """Number of cells and their size; where a scale field or a map changes them, before that."""
     counts = " x ".join(map(str, cells))
     return f"{counts}, {cell_size:g} mm each" if alike else f"{counts}, {cell_size:g} mm before scaling or mapping"
+
+
+def cell_shown(cell_size: float, alike: bool) -> str:
+    """How large cells are, as in a sentence; where a scale field or a map changes them, before that.
+
+    >>> cell_shown(10.0, alike=False)
+    'cells of 10 mm before scaling or mapping'
+    """
+    return f"cells of {cell_size:g} mm{'' if alike else ' before scaling or mapping'}"
 
 
 def wall_shown(thickness: float, low: float, high: float, density: float) -> str:

@@ -27,7 +27,7 @@ from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part, selected_faces
-from gyroid_cad.kernel.skin import Hollow, hollow
+from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.stl import require_near_origin
@@ -219,8 +219,7 @@ def fill(
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it.
     tolerance : float, optional
-        Largest deviation of the fit in cell sizes; if left out, 1e-4 of a graded wall, and what ``fit`` gives of a
-        uniform one.
+        Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
         size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
@@ -264,7 +263,7 @@ def fill(
     whole = part_of(part)
     if lattice is None:
         require_cover(whole.low, whole.high, size, settings.control_points)
-    hollow = None if shell is None else _hollowed(whole, shell, openings)
+    hollow = None if shell is None else hollowed(whole, shell, selected_faces(whole, openings))
     core = whole if hollow is None else hollow.core
     filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
     outcome = filling.run(frame)
@@ -300,11 +299,11 @@ def _described(
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
-    if wanted.uniform and tolerance is not None:
-        fit = fit_within(fit, tolerance, surface.family)
+    settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
+    closeness = tolerance or USUAL_TOLERANCE
 
     def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
-        made = endless_infill(part, frame, size, wanted, fit, tolerance or USUAL_TOLERANCE, timed, surface)
+        made = endless_infill(part, frame, size, wanted, settings, closeness, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
             name, given = ("thickness", thickness) if density is None else ("density", density)
@@ -315,12 +314,7 @@ def _described(
             )
         return made
 
-    return wanted.regions, size, fit, endless
-
-
-def _hollowed(part: Part, skin: float, openings: Sequence[Any]) -> Hollow:
-
-    return hollow(part, skin, selected_faces(part, openings))
+    return wanted.regions, size, settings, endless
 
 
 def _reported(
@@ -361,5 +355,6 @@ def _reported(
         by_sections=outcome.by_sections,
         shift=(x, y, z),
         seconds=dict(filling.seconds),
+        cells_alike=outcome.infill.grading.cells_alike,
     )
     return Filled(shapes, report)

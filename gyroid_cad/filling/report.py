@@ -7,7 +7,7 @@ from typing import Any
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind
-from gyroid_cad.common.tables import Rows, islands_shown, text_table
+from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
 
 __all__ = ["FillReport"]
 
@@ -20,7 +20,8 @@ class FillReport:
     ----------
     kind : str
     cell_size, thickness : float
-        In mm; the wall where it is thickest, or for a network twice the distance of its border from the surface.
+        In mm; cells before a scale field or a map of a block; the wall where it is thickest, or for a network twice the
+        distance of its border from the surface.
     min_wall : float, optional
         The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a network.
     skin : float, optional
@@ -48,6 +49,8 @@ class FillReport:
         Of the lattice, in mm, where the kernel did not manage without.
     seconds : dict
         By stage.
+    cells_alike : bool
+        False where a scale field or a map makes cells of other sizes.
 
     Examples
     --------
@@ -87,6 +90,7 @@ class FillReport:
     by_sections: bool
     shift: Point
     seconds: dict[str, float]
+    cells_alike: bool
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -97,7 +101,7 @@ class FillReport:
         state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
         of_part = f"{self.part_volume:.8g}, density {self.density:.5f}"
         return [
-            ("kind", f"{self.kind}, cells of {self.cell_size:g} mm, wall {self.thickness:.6g} mm"),
+            ("kind", f"{self.kind}, {cell_shown(self.cell_size, self.cells_alike)}, wall {self.thickness:.6g} mm"),
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
             *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
             ("solids, faces", f"{self.solids}, {self.faces} ({state})"),

@@ -90,8 +90,8 @@ class Regions:
 
     @property
     def uniform(self) -> bool:
-        """True where the wall is the same everywhere."""
-        return not isinstance(self.thickness, Field) and not isinstance(self.density, Field)
+        """Whether the wall is the same everywhere."""
+        return not isinstance(self.thickness, Field | None)
 
 
 def regions_of(

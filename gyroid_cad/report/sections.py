@@ -16,6 +16,7 @@ import numpy as np
 
 from gyroid_cad.builds.meshes import mesh_quality
 from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.tables import cell_shown
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.printing.print_check import print_check
@@ -137,7 +138,7 @@ def report_on_lattice(
     with timed(seconds, "facets", progress):
         facets = _facets(lattice)
     counts = " x ".join(map(str, lattice.cells))
-    title = f"{lattice.surface}, {counts} cells of {lattice.cell_size:g} mm"
+    title = f"{lattice.surface}, {counts} {cell_shown(lattice.cell_size, lattice.grading().cells_alike)}"
     return Report(title[0].upper() + title[1:], "lattice", sections, facets, seconds)
 
 

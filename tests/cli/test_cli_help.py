@@ -116,10 +116,19 @@ def test_every_example_runs_with_fewer_cells(name: str, line: str, folder: Path,
         assert (folder / output).stat().st_size > 0
 
 
-def test_help_shows_each_example_whole_on_its_line(capsys: Captured) -> None:
-    for name, line in EXAMPLES:
-        assert main([name, "--help"] if name else ["--help"]) == 0
-        assert line in [shown.strip() for shown in capsys.readouterr().out.splitlines()]
+@pytest.mark.parametrize("columns", [60, 80])
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_help_keeps_to_the_terminal_and_its_examples_can_be_pasted(
+    name: str, columns: int, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert main([*([name] if name else []), "--help"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) < columns
+    # As a shell reads them: a backslash at the end of a line goes on in the next one.
+    script = "\n".join(line[2:] for line in lines).replace("\\\n", "")
+    shown = [" ".join(line.split()) for line in script.splitlines() if line.startswith("gyroid-cad ")]
+    assert shown == [line for owner, line in EXAMPLES if owner == name]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -241,6 +241,7 @@ def test_a_block_carried_by_a_map_ends_in_the_part_with_its_own_side_walls() -> 
     half = fill(ball(), lattice=twisted, origin=(5.0, 0, 0)).report
     assert half.valid
     assert half.closed
+    assert "cells of 10 mm before scaling or mapping, wall" in str(half)
     assert 0 < half.volume < 0.6 * fill(ball(), CELL, WALL, fit=COARSE).report.volume
 
 
@@ -336,6 +337,15 @@ def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], wor
         fill(**arguments)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_tolerance_is_heeded_of_a_uniform_wall_too() -> None:
+    box = cq.Workplane().box(6, 6, 6)
+    coarse, fine = (fill(box, CELL, WALL, fit=FitSettings(5), tolerance=part) for part in (0.5, 1e-5))
+    exact = fill(box, CELL, WALL, fit=FitSettings(14)).report.volume
+    assert abs(fine.report.volume / exact - 1) < 1e-5 < abs(coarse.report.volume / exact - 1)
+    with pytest.raises(ParameterError, match=r"^tolerance = 1e-12: expected at least"):
+        fill(box, CELL, WALL, tolerance=1e-12)
 
 
 def test_solids_that_meet_in_an_edge_are_no_reason_to_refuse() -> None:

@@ -36,6 +36,7 @@ from gyroid_cad.cli.print_check import check_by
 from gyroid_cad.common.choices import KINDS
 from gyroid_cad.common.files import file_sizes
 from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endings, require_formats, require_settings
+from gyroid_cad.common.memory import require_libraries
 
 __all__ = ["fill_command"]
 
@@ -127,6 +128,7 @@ def fill_command(
     gyroid-cad fill other.step fill.toml -o other_light.step --density 0.25
     """
     start = time.perf_counter()
+    require_libraries()
     from gyroid_cad.filling.fill import fill
 
     if part is None:

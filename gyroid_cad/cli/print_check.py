@@ -14,6 +14,7 @@ from gyroid_cad.cli.console import print_check_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.cli.options import json_option, printer_option
 from gyroid_cad.common.formats import TOML, TRIANGLE_FORMATS, format_of, require_format
+from gyroid_cad.common.memory import require_libraries
 
 if TYPE_CHECKING:
     from gyroid_cad.common.progress import Progress
@@ -61,6 +62,7 @@ def print_check_command(
     gyroid-cad print-check --cells 4 4 4 --cell-size 12 --thickness 0.8
     """
     start = time.perf_counter()
+    require_libraries(kernel=False)
     checked, file = check_by(printer), given["config"]
     part: Any = file
     if file is None or format_of(file) is TOML:

@@ -14,6 +14,7 @@ from gyroid_cad.cli.console import print_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options_beside, options_given
 from gyroid_cad.cli.options import file_paths, printer_option
 from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, require_format
+from gyroid_cad.common.memory import require_libraries
 from gyroid_cad.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ def report_command(
     gyroid-cad report part.step -o part.html
     """
     start = time.perf_counter()
+    require_libraries(kernel=False)
     from gyroid_cad.report.page import require_page, write_page
 
     if not output and not as_json:

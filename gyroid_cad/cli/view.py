@@ -26,6 +26,7 @@ from gyroid_cad.common.formats import (
     require_output,
 )
 from gyroid_cad.common.inputs import unreadable
+from gyroid_cad.common.memory import require_libraries
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.lattice import Lattice
@@ -168,6 +169,7 @@ def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
     gyroid-cad view lattice.toml -o lattice.png
     """
 
+    require_libraries()
     file = given["config"]
     named = file is not None and not file.lower().endswith(_TOML_ENDING)
     what = file if named else lattice_of(given)

@@ -10,14 +10,16 @@ from pathlib import Path
 
 import psutil
 
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.errors import GyroidError, ParameterError
 
-__all__ = ["Room", "cgroup_rooms", "memory_rooms", "require_memory", "require_room"]
+__all__ = ["Room", "cgroup_rooms", "memory_rooms", "require_libraries", "require_memory", "require_room"]
 
 # What imports and one cell take.
 _BASE_BYTES = 400_000_000
 # What loading the kernel adds to a process's address space, and to its data.
 _KERNEL_ADDRESSES, _KERNEL_DATA = 650_000_000, 150_000_000
+# And what the numerical libraries beside it add: nearest neighbours, labels, VTK.
+_NUMERICS_ADDRESSES, _NUMERICS_DATA = 350_000_000, 50_000_000
 # Of a limit of the process something is taken before the first cell.
 _PROCESS_BYTES = 50_000_000
 # A control group's limit, what it uses, and in memory.stat how much of that the system drops when it has to.
@@ -125,7 +127,7 @@ def memory_rooms(kernel: bool = True, base: int = _BASE_BYTES) -> Iterator[Room]
 
     yield Room(psutil.virtual_memory().available, base, "are free")
     yield from cgroup_rooms(base)
-    yield from _process_rooms(kernel and "OCP" not in sys.modules)
+    yield from _process_rooms(kernel)
 
 
 def cgroup_rooms(
@@ -160,22 +162,44 @@ def cgroup_rooms(
                 break
 
 
-def _process_rooms(loads_kernel: bool) -> Iterator[Room]:
-    """Yield what this process's own limits leave it (``ulimit -v``, ``ulimit -d``)."""
+def require_libraries(kernel: bool = True) -> None:
+    """Refuse to load libraries into a process whose limits leave no room for them.
+
+    Some end it with a signal then, and others, OpenBLAS for one, wait for ever.
+
+    Parameters
+    ----------
+    kernel : bool
+        Whether the CAD kernel is needed.
+
+    Raises
+    ------
+    GyroidError
+    """
+    for room in _process_rooms(kernel, numerics=True):
+        if not room.left:
+            raise GyroidError(
+                f"what this loads takes about {room.base / 1e9:.2g} GB, and {room.free / 1e9:.2g} GB {room.where}"
+            )
+
+
+def _process_rooms(kernel: bool, numerics: bool = False) -> Iterator[Room]:
+    """Yield what this process's own limits leave it (``ulimit -v``, ``ulimit -d``), whatever it is yet to load."""
     try:
         import resource
     except ImportError:  # there are none on Windows
         return
 
-    limits = [
-        (resource.RLIMIT_AS, "vms", _KERNEL_ADDRESSES, "of address space are left (ulimit -v)"),
-        (resource.RLIMIT_DATA, "data", _KERNEL_DATA, "of data are left (ulimit -d)"),
-    ]
-    for number, name, of_kernel, where in limits:
+    addresses = (_KERNEL_ADDRESSES, _NUMERICS_ADDRESSES), "of address space are left (ulimit -v)"
+    data = (_KERNEL_DATA, _NUMERICS_DATA), "of data are left (ulimit -d)"
+    limits = [(resource.RLIMIT_AS, "vms", *addresses), (resource.RLIMIT_DATA, "data", *data)]
+    loads = kernel and "OCP" not in sys.modules, numerics and "scipy.spatial" not in sys.modules
+    for number, name, sizes, where in limits:
         limit = resource.getrlimit(number)[0]
         if limit != resource.RLIM_INFINITY:
             used = getattr(psutil.Process().memory_info(), name, 0)
-            yield Room(max(0, limit - used), _PROCESS_BYTES + loads_kernel * of_kernel, where)
+            yet = sum(size for size, loaded in zip(sizes, loads, strict=True) if loaded)
+            yield Room(max(0, limit - used), _PROCESS_BYTES + yet, where)
 
 
 def _text(path: Path) -> str:

@@ -257,12 +257,12 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    regions, size, infill_in = _described(
+    regions, size, settings, infill_in = _described(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
     )
     whole = part_of(part)
     if lattice is None:
-        require_cover(whole.low, whole.high, size, (fit or FitSettings()).control_points)
+        require_cover(whole.low, whole.high, size, settings.control_points)
     hollow = None if shell is None else hollowed(whole, shell, selected_faces(whole, openings))
     core = whole if hollow is None else hollow.core
     filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
@@ -285,17 +285,17 @@ def _described(
     tolerance: float | None,
     lattice: Lattice | None,
     surface: MinimalSurface,
-) -> tuple[tuple[Region, ...], float, _InfillIn]:
-    """The regions wanted, the cell size, and how the lattice is to be had for a part and a frame."""
+) -> tuple[tuple[Region, ...], float, FitSettings, _InfillIn]:
+    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame."""
     if lattice is not None:
-        given = {"cell_size": cell_size, "thickness": thickness, "density": density}
+        given = {"cell_size": cell_size, "thickness": thickness, "density": density, "tolerance": tolerance}
         for name, value in given.items():
             if value is not None:
                 raise ParameterError(name, value, "none beside a lattice, which has its own")
         if kind != SHEET:
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
         regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
-        return regions.regions, lattice.cell_size, lambda part, frame, timed: block_infill(lattice, frame)
+        return regions.regions, lattice.cell_size, fit, lambda part, frame, timed: block_infill(lattice, frame)
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
@@ -314,7 +314,7 @@ def _described(
             )
         return made
 
-    return wanted.regions, size, endless
+    return wanted.regions, size, settings, endless
 
 
 def _reported(

@@ -13,7 +13,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import THINNEST_WALL
-from gyroid_cad.wall.parameters import require_density, require_one, require_thickness
+from gyroid_cad.wall.parameters import percent_hint, require_density, require_one, require_thickness
 
 __all__ = [
     "CHANNELS",
@@ -156,8 +156,10 @@ def _network(kind: Kind, cell_size: float, density: FieldLike | None, tube: Tube
     accepted = f"{meaning}, one number above {low:.5f} and below {high:.5f}"
     fraction = as_field("density", density, meaning)
     # Only an offset of the mid-surface that is the same everywhere bounds a network of this density.
-    if not isinstance(fraction, float) or not low < fraction < high:
+    if not isinstance(fraction, float):
         raise ParameterError("density", density, accepted)
+    if not low < fraction < high:
+        raise ParameterError("density", fraction, accepted + percent_hint(fraction))
     offset = float(tube.network_offset(fraction) * cell_size)
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)

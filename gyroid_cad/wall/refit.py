@@ -114,12 +114,27 @@ def likely_control_points(complex: CellComplex, grading: Grading, least: int, to
         Control points to fit those with, and the least to answer.
     tolerance : float
         In cell sizes.
+
+    Raises
+    ------
+    ParameterError
+        If even the finest fit of those few misses the tolerance.
+    FitError
+        If that is because a field or the map is not continuous.
     """
     few = np.unique(np.linspace(0, complex.patch_count - 1, _TRIED_PATCHES).astype(np.int64))
     made = measured(fitted_nets(complex, grading, least, few), complex, grading, few)
+    excess = made.excess(tolerance, grading.cell_size)
+    if excess <= 1:
+        return least
+    if more_control_points(least, excess) == MOST_CONTROL_POINTS:
+        finest = measured(fitted_nets(complex, grading, MOST_CONTROL_POINTS, few), complex, grading, few)
+        if finest.excess(tolerance, grading.cell_size) > 1:
+            # All patches take the finest fit many seconds. A jump, which a coarse fit shows as well, is told as one.
+            graded_wall(complex, grading, least)
+            finest.control_points_for(tolerance, grading.cell_size)
     # A wall that folds is off by any amount; whether it does is not for this to say.
-    excess = min(made.excess(tolerance, grading.cell_size), _LARGEST_EXCESS_TRUSTED)
-    return least if excess <= 1 else more_control_points(least, excess)
+    return more_control_points(least, min(excess, _LARGEST_EXCESS_TRUSTED))
 
 
 def graded_wall(complex: CellComplex, grading: Grading, control_points: int) -> Wall:

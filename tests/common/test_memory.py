@@ -74,3 +74,39 @@ def test_a_process_that_may_not_have_so_much_says_so_in_one_line_before_it_works
     assert run.stderr.endswith(f"(ulimit {option})\n")
     assert run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not hold programs to such limits")
+@pytest.mark.parametrize("limit", [300_000, 500_000, 800_000])
+@pytest.mark.parametrize(
+    "command", [FILL, ["report", "part.step", "-o", "a.html"], ["view", "part.step", "-o", "a.png"]]
+)
+def test_where_the_libraries_do_not_fit_in_it_is_one_line_at_once(
+    tmp_path: Path, command: list[str], limit: int
+) -> None:
+    (tmp_path / "part.step").write_text("ISO-10303-21;")
+    shell = f'ulimit -v {limit} && exec "$0" -m gyroid_cad "$@"'
+    run = subprocess.run(
+        ["bash", "-c", shell, sys.executable, *command],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (run.returncode, run.stdout) == (1, "")
+    assert run.stderr.startswith("gyroid-cad: error: ")
+    assert run.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["part.step"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not hold programs to such limits")
+@pytest.mark.parametrize("limit", [250_000, 400_000])
+def test_a_print_check_that_has_no_room_does_not_ask_for_what_is_installed(tmp_path: Path, limit: int) -> None:
+    (tmp_path / "a.stl").write_bytes(b"solid")
+    shell = f'ulimit -v {limit} && exec "$0" -m gyroid_cad print-check a.stl'
+    run = subprocess.run(
+        ["bash", "-c", shell, sys.executable], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert run.returncode == 1
+    assert run.stderr.endswith("of address space are left (ulimit -v)\n")

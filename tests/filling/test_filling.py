@@ -310,6 +310,11 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"skin": 0.4, "openings": ["up"]}, "openings = 'up'"),
         ({"skin": 0.4, "openings": [(50, 0, 0)]}, "a point on a face; the nearest is"),
         ({"tolerance": 2}, "tolerance = 2"),
+        ({"tolerance": 1e-12}, "at least about 5.5e-09, which 40 control points reach"),
+        (
+            {"lattice": Lattice((1, 1, 1), 10, 1), "cell_size": None, "thickness": None, "tolerance": 1e-3},
+            "tolerance = 0.001: expected none beside a lattice",
+        ),
         ({"lattice": Lattice((1, 1, 1), 10, 1)}, "cell_size = 10.0: expected none beside a lattice"),
         ({"kind": "network-a", "thickness": None, "density": 0.01}, "above 0.02983"),
         ({"origin": (0, 0)}, "origin = (0, 0): expected three finite numbers"),

@@ -266,10 +266,31 @@ def test_more_control_points_are_asked_for_until_both_errors_are_small(
 
 def test_the_first_guess_is_no_less_than_asked_for_and_stays_in_bounds() -> None:
     assert likely_control_points(CELL, GRADINGS["slope"], 14, 0.1) == 14
-    # Twisted over and over: no fit is any good, and the guess is not trusted far.
-    wild = Grading(L, 0.1, map=Twist(3000).over(SIZE))
-    assert 10 < likely_control_points(CELL, wild, 10, 1e-6) < 20
-    assert likely_control_points(CELL, wild, MOST_CONTROL_POINTS, 1e-6) == MOST_CONTROL_POINTS
+    # The guess is not trusted far.
+    assert 10 < likely_control_points(CELL, GRADINGS["slope"], 10, 1e-6) < 20
+    assert likely_control_points(CELL, GRADINGS["slope"], MOST_CONTROL_POINTS, 1e-6) == MOST_CONTROL_POINTS
+
+
+@pytest.mark.parametrize(
+    ("grading", "tolerance"),
+    # Twisted over and over: no fit is any good.
+    [(GRADINGS["slope"], 1e-12), (Grading(L, 0.1, map=Twist(3000).over(SIZE)), 1e-6)],
+    ids=["too small", "twisted"],
+)
+def test_a_tolerance_out_of_reach_is_refused_from_a_few_patches(
+    monkeypatch: pytest.MonkeyPatch, grading: Grading, tolerance: float
+) -> None:
+    fitted: list[tuple[int, int]] = []
+
+    def counted(complex: CellComplex, grading: Grading, control_points: int, patches: NDArray[np.int64]) -> Floats:
+        fitted.append((control_points, len(patches)))
+        return fitted_nets(complex, grading, control_points, patches)
+
+    monkeypatch.setattr(refit_module, "fitted_nets", counted)
+    block = build_complex((3, 3, 3))
+    with pytest.raises(ParameterError, match=r"^tolerance = .* 40 control points a side are"):
+        likely_control_points(block, grading, 10, tolerance)
+    assert [count for n, count in fitted if n > 10] == [32]
 
 
 @pytest.mark.parametrize(

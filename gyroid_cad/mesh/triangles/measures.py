@@ -296,7 +296,7 @@ def _vtk(module: str) -> Any:
     """A module of VTK, which comes with the kernel's usual wheel."""
     try:
         return import_module(f"vtkmodules.{module}")
-    except ImportError as problem:
+    except ModuleNotFoundError as problem:
         raise GyroidError(f"measuring the walls of triangles needs VTK (pip install vtk): {problem}") from None
 
 

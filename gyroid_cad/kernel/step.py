@@ -26,7 +26,7 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.check import Topology, topology
+from gyroid_cad.kernel.check import Topology, topology, without_places
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -91,7 +91,7 @@ def topology_in_step(path: str | os.PathLike[str]) -> Topology:
 
 def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Shape) -> None:
     """Refuse a file that does not hold all of a shape, or not as closed."""
-    wanted, found = topology(shape), topology_in_step(written)
+    wanted, found = topology(without_places(shape)), topology_in_step(written)
     whole = (found.solids, found.faces) == (wanted.solids, wanted.faces)
     if not whole or found.open_edges > wanted.open_edges:
         raise ExportError(

@@ -28,7 +28,7 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.surface import NurbsSurface, face_integrals
 
-__all__ = ["Topology", "compound_of", "enclosed_volume", "is_valid", "parts_of", "topology", "without_places"]
+__all__ = ["Topology", "compound_of", "enclosed_volume", "is_valid", "parts_of", "topology"]
 
 Floats = NDArray[np.float64]
 
@@ -70,14 +70,6 @@ def topology(shape: TopoDS_Shape) -> Topology:
         faces=sum(1 for _ in parts_of(shape, TopAbs_FACE)),
         open_edges=sum(pair != (1, 1) for pair in both),
     )
-
-
-def without_places(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """Return each solid of a shape once, wherever and however often it stands; a shape without solids as it is."""
-    once = NumberedShapes()
-    for solid in parts_of(shape, TopAbs_SOLID):
-        once.Add(solid.Located(TopLoc_Location()))
-    return compound_of(once.FindKey(number) for number in range(1, once.Extent() + 1)) if once.Extent() else shape
 
 
 def is_valid(shape: TopoDS_Shape) -> bool:

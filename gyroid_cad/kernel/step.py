@@ -20,13 +20,16 @@ from OCP.StepBasic import StepBasic_Product
 from OCP.STEPCAFControl import STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Reader, STEPControl_Writer
 from OCP.TCollection import TCollection_HAsciiString
+from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_ShapeEnum, TopAbs_SOLID
+from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.check import Topology, topology, without_places
+from gyroid_cad.kernel.check import Topology, parts_of, topology
+from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -91,13 +94,23 @@ def topology_in_step(path: str | os.PathLike[str]) -> Topology:
 
 def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Shape) -> None:
     """Refuse a file that does not hold all of a shape, or not as closed."""
-    wanted, found = topology(without_places(shape)), topology_in_step(written)
-    whole = (found.solids, found.faces) == (wanted.solids, wanted.faces)
+    wanted, found = topology(shape), topology_in_step(written)
+    # Copies of one solid are written once, with the places where they stand.
+    solids, faces = (_counted_once(shape, kind) for kind in (TopAbs_SOLID, TopAbs_FACE))
+    whole = solids <= found.solids <= wanted.solids and faces <= found.faces <= wanted.faces
     if not whole or found.open_edges > wanted.open_edges:
         raise ExportError(
             f"{path} was not written: the kernel's STEP writer gave {found.solids} of {wanted.solids} solids, "
             f"{found.faces} of {wanted.faces} faces and {found.open_edges} open edges; BREP holds the shape as it is"
         )
+
+
+def _counted_once(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> int:
+    """Count the parts of a kind, those that differ by their places only as one."""
+    parts = NumberedShapes()
+    for part in parts_of(shape, kind):
+        parts.Add(part.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD))
+    return int(parts.Extent())
 
 
 def _entities(lines: TextIO) -> Iterator[str]:

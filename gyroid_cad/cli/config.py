@@ -11,7 +11,7 @@ from typing import Any
 
 import tomli_w
 
-from gyroid_cad.common.doors import key_of
+from gyroid_cad.common.doors import commands_with, key_of
 from gyroid_cad.common.inputs import key_line, read_toml
 from gyroid_cad.errors import ParameterError
 
@@ -85,9 +85,7 @@ def read_config(path: str, known: Iterable[str], flags: Iterable[str] = ()) -> C
     values = _without_table(tables, known, path, text)
     for key, value in values.items():
         if key not in known:
-            near = [key_of(key)] if key_of(key) in known else difflib.get_close_matches(_spelt(key), known, 1, 0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-            raise ParameterError(_place(path, text, key), value, f"a known key; {hint}")
+            raise ParameterError(_place(path, text, key), value, f"a known key; {_hint(key, known)}")
         if key in flags:
             if not isinstance(value, bool):
                 raise ParameterError(_place(path, text, key), value, "true or false")
@@ -101,8 +99,14 @@ def read_config(path: str, known: Iterable[str], flags: Iterable[str] = ()) -> C
     return Config(path, as_text, text)
 
 
-def _spelt(key: str) -> str:
-    return key.replace("-", "_").lower()
+def _hint(key: str, known: Sequence[str]) -> str:
+    """What an unknown key may be meant to be: Python's name of one, one of another command, or one misspelt."""
+    spelt = key.replace("-", "_").lower()
+    near = [key_of(key)] if key_of(key) in known else difflib.get_close_matches(spelt, known, 1, 0.6)
+    if not near and spelt not in known and (commands := commands_with(spelt)):
+        return f"{spelt} is one of gyroid-cad {' or '.join(commands)}"
+    near = near or difflib.get_close_matches(spelt, known, 1, 0.5)
+    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
 
 
 def _without_table(tables: dict[str, Any], known: Sequence[str], path: str, text: str) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -37,6 +39,7 @@ from gyroid_cad.common.choices import KINDS
 from gyroid_cad.common.files import file_sizes
 from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endings, require_formats, require_settings
 from gyroid_cad.common.memory import require_libraries
+from gyroid_cad.errors import ParameterError
 
 __all__ = ["fill_command"]
 
@@ -80,8 +83,8 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     type=click.Choice(KINDS),
     default="sheet",
     show_default=True,
-    help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone. A "
-    "network's density is its own.",
+    help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone. "
+    "Density is that of the wall, of channels too, but of a network its own.",
 )
 @click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
 @click.option(
@@ -139,7 +142,7 @@ def fill_command(
     if print_config:
         click.echo(printed_options(), nl=False)
         return
-    require_formats(output)
+    _require_another_file(part, output)
     written = {name: given[name] for name in ("schema", "deviation", "angle")}
     require_settings((1, 1, 1), **written)
     checked = None if printer is None else check_by(printer)
@@ -158,6 +161,18 @@ def fill_command(
         print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
         if check is not None:
             print_check_table(check)
+
+
+def _require_another_file(part: str, output: Sequence[str]) -> None:
+    """Check the files to be written: none of them may be the part itself.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for path in require_formats(output):
+        if path.exists() and Path(part).exists() and path.samefile(part):
+            raise ParameterError("output", str(path), "another file than the part that is filled")
 
 
 def _settings(given: dict[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["DOORS", "FILL", "LATTICE", "Absent", "Row", "key_of"]
+__all__ = ["DOORS", "FILL", "LATTICE", "Absent", "Row", "commands_with", "key_of"]
 
 DOORS = ("python", "shell", "toml", "cadquery", "build123d")
 
@@ -168,3 +168,13 @@ def key_of(parameter: str) -> str:
     others = {row.python: row.toml for row in (*LATTICE, *FILL)}
     key = others.get(parameter)
     return key if isinstance(key, str) else parameter
+
+
+def commands_with(key: str) -> list[str]:
+    """Commands of the shell that take a key of a file.
+
+    >>> commands_with("skin"), commands_with("trim"), commands_with("cells"), commands_with("skn")
+    (['fill'], ['build'], ['build', 'fill'], [])
+    """
+    tables = {"build": LATTICE, "fill": FILL}
+    return [command for command, rows in tables.items() if any(row.toml == key for row in rows)]

@@ -237,7 +237,7 @@ def test_the_config_of_an_assembly_makes_the_same_assembly(capsys: Captured, tmp
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--fit", "rough"], ["--fit", "rough"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--schema", "ap203"], ["--schema", "ap203"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "0"], ["--deviation = 0.0"]),
-        (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "1e-7"], ["--deviation = 1e-07", "mm or more"]),
+        (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "1e-7"], ["--deviation = 1e-07", "1e-06 mm"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--angle", "90"], ["--angle = 90.0"]),
         (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl or .3mf"]),
         (["build", "-o", "a.step", "-o", "./a.step", *ONE_CELL, *WALL], ["-o = ", "each file once"]),

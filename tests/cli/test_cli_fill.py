@@ -336,3 +336,13 @@ def test_a_part_that_a_file_names_wrongly_is_told_by_the_files_line(capsys: Capt
     assert failed.status != 0
     assert len(failed.err.splitlines()) == 1
     assert "part.iges" in failed.err
+
+
+def test_the_part_itself_is_not_overwritten(capsys: Captured, block: Path, tmp_path: Path) -> None:
+    (tmp_path / "link.step").symlink_to(block)
+    before = block.read_bytes()
+    for name in (block, tmp_path / "link.step"):
+        done = run(capsys, block, "-o", name, *FILL, "--density", "0.3")
+        assert done.status == 2
+        assert "expected another file than the part that is filled" in done.err
+    assert block.read_bytes() == before

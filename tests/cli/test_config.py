@@ -146,3 +146,9 @@ def test_a_parameter_of_python_is_known_by_its_key(tmp_path: Path) -> None:
     (tmp_path / "fill.toml").write_text('paths = ["a.step"]')
     with pytest.raises(ParameterError, match="did you mean output"):
         read_config(str(tmp_path / "fill.toml"), ["output", "part", "cells"])
+
+
+def test_a_key_of_another_command_is_said_to_be_that(tmp_path: Path) -> None:
+    (tmp_path / "fill.toml").write_text('kind = "sheet"')
+    with pytest.raises(ParameterError, match="kind is one of gyroid-cad fill"):
+        read_config(str(tmp_path / "fill.toml"), ["cells", "keep_islands"])

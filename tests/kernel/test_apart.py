@@ -48,7 +48,7 @@ def test_what_comes_from_the_other_process_is_what_the_reader_gives(
 def test_brackets_in_brackets_that_crash_the_reader_are_one_line(tmp_path: Path) -> None:
     path = tmp_path / "nested.step"
     path.write_text(f"{HEADER}#1=A({'(' * 200_000}{')' * 200_000});\nENDSEC;\nEND-ISO-10303-21;\n")
-    with pytest.raises(ExportError, match=r"nested\.step could not be read: the kernel crashes on it"):
+    with pytest.raises(ExportError, match=r"nested\.step (could not be read: the kernel crashes on it|holds no shape)"):
         read_shape(path)
 
 

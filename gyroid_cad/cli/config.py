@@ -100,7 +100,7 @@ def read_config(path: str, known: Iterable[str], flags: Iterable[str] = ()) -> C
 
 
 def _hint(key: str, known: Sequence[str]) -> str:
-    """What an unknown key may be meant to be: Python's name of one, one of another command, or one misspelt."""
+    """Guess what an unknown key is meant to be: Python's name of one, one of another command, or one misspelt."""
     spelt = key.replace("-", "_").lower()
     near = [key_of(key)] if key_of(key) in known else difflib.get_close_matches(spelt, known, 1, 0.6)
     if not near and spelt not in known and (commands := commands_with(spelt)):

@@ -37,7 +37,7 @@ def cells_shown(cells: tuple[int, int, int], cell_size: float, alike: bool = Tru
 
 
 def cell_shown(cell_size: float, alike: bool) -> str:
-    """How large cells are, as in a sentence; where a scale field or a map changes them, before that.
+    """Size of cells, as in a sentence; where a scale field or a map changes them, before that.
 
     >>> cell_shown(10.0, alike=False)
     'cells of 10 mm before scaling or mapping'

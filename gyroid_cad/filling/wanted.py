@@ -90,7 +90,7 @@ class Regions:
 
     @property
     def uniform(self) -> bool:
-        """Whether the wall is the same everywhere."""
+        """True where the wall is the same everywhere."""
         return not isinstance(self.thickness, Field | None)
 
 

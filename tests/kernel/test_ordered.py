@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import cadquery as cq
 import pytest
 from OCP.BRep import BRep_Builder
 from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD
@@ -18,6 +17,8 @@ from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_solid
 from gyroid_cad.kernel.ordered import in_order
 from gyroid_cad.kernel.part import measure
+
+cq = pytest.importorskip("cadquery", reason="no CadQuery for this kernel")
 
 SOLIDS = {
     "box": cq.Workplane().box(6, 5, 4),

@@ -1,0 +1,264 @@
+"""A part's boundary read out of the kernel's shape as numbers (:mod:`gyroid_cad.trim.boundary`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.BRepTools import BRepTools_WireExplorer
+from OCP.GeomAbs import (
+    GeomAbs_BSplineCurve,
+    GeomAbs_BSplineSurface,
+    GeomAbs_Circle,
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Line,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
+from OCP.gp import gp_Ax3, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
+from OCP.TopExp import TopExp
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex, as_wire
+from gyroid_cad.kernel.extent import box_round, corners_of
+from gyroid_cad.kernel.surfaces import nurbs_of_surface
+from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.nurbs.surface import point_derivatives
+from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
+from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface
+
+__all__ = ["ReadBoundary", "read_boundary"]
+
+Floats = NDArray[np.float64]
+Curve = Callable[[Floats], tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReadBoundary:
+    """A boundary, and the kernel's shapes by the same numbers.
+
+    Attributes
+    ----------
+    boundary : Boundary
+    faces : list of TopoDS_Face
+    edges : list of TopoDS_Edge
+        Forward.
+    vertices : list of TopoDS_Vertex
+    """
+
+    boundary: Boundary
+    faces: list[TopoDS_Face]
+    edges: list[TopoDS_Edge]
+    vertices: list[TopoDS_Shape]
+
+
+def read_boundary(shape: TopoDS_Shape) -> ReadBoundary:
+    """Read the boundary of a shape, its faces in the order in which they are found there.
+
+    Raises
+    ------
+    KernelError
+        If an edge and its curves on the faces do not run alike.
+    """
+    faces = [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
+    edges, vertices = NumberedShapes(), NumberedShapes()
+    for face in faces:
+        TopExp.MapShapes_s(face, TopAbs_EDGE, edges)
+        TopExp.MapShapes_s(face, TopAbs_VERTEX, vertices)
+    forward = [as_edge(edges.FindKey(k).Oriented(TopAbs_FORWARD)) for k in range(1, edges.Extent() + 1)]
+    corners = [as_vertex(vertices.FindKey(k)) for k in range(1, vertices.Extent() + 1)]
+    boundary = Boundary(
+        [_face(face, edges) for face in faces],
+        [_edge(edge, vertices) for edge in forward],
+        np.array([_values(BRep_Tool.Pnt_s(corner)) for corner in corners]),
+    )
+    return ReadBoundary(boundary, faces, forward, corners)
+
+
+def _face(face: TopoDS_Face, edges: NumberedShapes) -> BoundaryFace:
+    adaptor = BRepAdaptor_Surface(face, False)
+    forward = as_face(face.Oriented(TopAbs_FORWARD))
+    loops = [_loop(wire, forward, edges) for wire in parts_of(forward, TopAbs_WIRE)]
+    low, high = np.array(corners_of(box_round([face])))
+    periods = tuple(
+        period() if periodic() else 0.0
+        for periodic, period in (
+            (adaptor.IsUPeriodic, adaptor.UPeriod),
+            (adaptor.IsVPeriodic, adaptor.VPeriod),
+        )
+    )
+    sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
+    made = BoundaryFace(None, sign, loops, periods, low, high)  # type: ignore[arg-type]
+    made.surface = _surface(adaptor, made)
+    return made
+
+
+def _loop(wire: TopoDS_Shape, face: TopoDS_Face, edges: NumberedShapes) -> list[Coedge]:
+    explorer = BRepTools_WireExplorer(as_wire(wire), face)
+    loop = []
+    while explorer.More():
+        edge = explorer.Current()
+        if not BRep_Tool.SameParameter_s(edge) and not BRep_Tool.Degenerated_s(edge):
+            raise KernelError("an edge of the part and its curves on the faces do not run alike")
+        adaptor = BRepAdaptor_Curve2d(edge, face)
+        first, last = adaptor.FirstParameter(), adaptor.LastParameter()
+        along = edge.Orientation() == TopAbs_FORWARD
+        loop.append(Coedge(edges.FindIndex(edge) - 1, along, _curve_on_surface(adaptor), first, last))
+        explorer.Next()
+    if len(loop) != sum(1 for _ in parts_of(wire, TopAbs_EDGE)):
+        raise KernelError("a border of one of the part's faces does not close")
+    return loop
+
+
+def _edge(edge: TopoDS_Edge, vertices: NumberedShapes) -> BoundaryEdge:
+    start, end = (vertices.FindIndex(which(edge)) - 1 for which in (TopExp.FirstVertex_s, TopExp.LastVertex_s))
+    first, last = BRep_Tool.Range_s(edge)
+    curve = None if BRep_Tool.Degenerated_s(edge) else _curve_in_space(BRepAdaptor_Curve(edge))
+    return BoundaryEdge(curve, first, last, start, end, BRep_Tool.Tolerance_s(edge))
+
+
+def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
+    kind = adaptor.GetType()
+    if kind == GeomAbs_Plane:
+        return Quadric("plane", *_placed(adaptor.Plane().Position()))
+    if kind == GeomAbs_Cylinder:
+        cylinder = adaptor.Cylinder()
+        return Quadric("cylinder", *_placed(cylinder.Position()), cylinder.Radius())
+    if kind == GeomAbs_Cone:
+        cone = adaptor.Cone()
+        return Quadric("cone", *_placed(cone.Position()), cone.RefRadius(), cone.SemiAngle())
+    if kind == GeomAbs_Sphere:
+        sphere = adaptor.Sphere()
+        return Quadric("sphere", *_placed(sphere.Position()), sphere.Radius())
+    if kind == GeomAbs_Torus:
+        torus = adaptor.Torus()
+        return Quadric("torus", *_placed(torus.Position()), torus.MajorRadius(), torus.MinorRadius())
+    low, high = face.range
+    return FreeForm(_derivatives(adaptor), low, high)
+
+
+def _placed(position: gp_Ax3) -> tuple[Floats, Floats]:
+    directions = (position.XDirection(), position.YDirection(), position.Direction())
+    return np.array(_values(position.Location())), np.array([_values(direction) for direction in directions])
+
+
+def _derivatives(adaptor: BRepAdaptor_Surface) -> Callable[[Floats, Floats], tuple[Floats, ...]]:
+    if adaptor.GetType() == GeomAbs_BSplineSurface:
+        spline = adaptor.BSpline()
+        if not (spline.IsUPeriodic() or spline.IsVPeriodic()):
+            surface = nurbs_of_surface(spline)
+            degrees = (spline.UDegree(), spline.VDegree())
+            if all(np.ptp(k[: d + 1]) == 0 and np.ptp(k[-d - 1 :]) == 0 for k, d in zip(
+                    (surface.knots_u, surface.knots_v), degrees, strict=True)):
+                given = surface.control_points[np.newaxis], surface.weights, (surface.knots_u, surface.knots_v)
+
+                def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
+                    return tuple(some[0] for some in point_derivatives(*given, s[np.newaxis], t[np.newaxis], 2))
+
+                return found
+
+    def asked(s: Floats, t: Floats) -> tuple[Floats, ...]:
+        made = np.empty((6, len(s), 3))
+        point, vectors = gp_Pnt(), [gp_Vec() for _ in range(5)]
+        ds, dt, dss, dtt, dst = vectors
+        for index, (u, v) in enumerate(zip(s.tolist(), t.tolist(), strict=True)):
+            adaptor.D2(u, v, point, ds, dt, dss, dtt, dst)
+            for row, value in enumerate((point, ds, dt, dss, dst, dtt)):
+                made[row, index] = value.X(), value.Y(), value.Z()
+        return tuple(made)
+
+    return asked
+
+
+def _curve_in_space(adaptor: BRepAdaptor_Curve) -> Curve:
+    kind = adaptor.GetType()
+    if kind == GeomAbs_Line:
+        line = adaptor.Line()
+        return _line(np.array(_values(line.Location())), np.array(_values(line.Direction())))
+    if kind == GeomAbs_Circle:
+        circle = adaptor.Circle()
+        position = circle.Position()
+        axes = [np.array(_values(axis)) for axis in (position.XDirection(), position.YDirection())]
+        return _circle(np.array(_values(position.Location())), *axes, circle.Radius())
+    if kind == GeomAbs_BSplineCurve:
+        spline = adaptor.BSpline()
+        if not spline.IsPeriodic():
+            poles = np.array([_values(spline.Pole(k)) for k in range(1, spline.NbPoles() + 1)])
+            return _spline(spline, poles)
+
+    def asked(t: Floats) -> tuple[Floats, Floats]:
+        point, along = gp_Pnt(), gp_Vec()
+        made = np.empty((2, len(t), 3))
+        for index, place in enumerate(t.tolist()):
+            adaptor.D1(place, point, along)
+            made[:, index] = _values(point), _values(along)
+        return made[0], made[1]
+
+    return asked
+
+
+def _curve_on_surface(adaptor: BRepAdaptor_Curve2d) -> Curve:
+    kind = adaptor.GetType()
+    if kind == GeomAbs_Line:
+        line = adaptor.Line()
+        origin, along = line.Location(), line.Direction()
+        return _line(np.array([origin.X(), origin.Y()]), np.array([along.X(), along.Y()]))
+    if kind == GeomAbs_BSplineCurve:
+        spline = adaptor.BSpline()
+        if not spline.IsPeriodic():
+            poles = [spline.Pole(k) for k in range(1, spline.NbPoles() + 1)]
+            return _spline(spline, np.array([(pole.X(), pole.Y()) for pole in poles]))
+
+    def asked(t: Floats) -> tuple[Floats, Floats]:
+        point, along = gp_Pnt2d(), gp_Vec2d()
+        made = np.empty((2, len(t), 2))
+        for index, place in enumerate(t.tolist()):
+            adaptor.D1(place, point, along)
+            made[:, index] = (point.X(), point.Y()), (along.X(), along.Y())
+        return made[0], made[1]
+
+    return asked
+
+
+def _line(origin: Floats, direction: Floats) -> Curve:
+    return lambda t: (origin + t[:, np.newaxis] * direction, np.broadcast_to(direction, (len(t), len(direction))))
+
+
+def _circle(centre: Floats, x: Floats, y: Floats, radius: float) -> Curve:
+    def found(t: Floats) -> tuple[Floats, Floats]:
+        cosine, sine = np.cos(t)[:, np.newaxis], np.sin(t)[:, np.newaxis]
+        return centre + radius * (cosine * x + sine * y), radius * (cosine * y - sine * x)
+
+    return found
+
+
+def _spline(spline: object, poles: Floats) -> Curve:
+    """A B-spline curve of the kernel's, in space or in the plane, by its own basis."""
+    count = spline.NbKnots()  # type: ignore[attr-defined]
+    knots = np.repeat(
+        [spline.Knot(k) for k in range(1, count + 1)],  # type: ignore[attr-defined]
+        [spline.Multiplicity(k) for k in range(1, count + 1)],  # type: ignore[attr-defined]
+    )
+    degree = int(spline.Degree())  # type: ignore[attr-defined]
+    weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])  # type: ignore[attr-defined]
+    weighted = np.concatenate([poles * weights[:, np.newaxis], weights[:, np.newaxis]], axis=1)
+
+    def found(t: Floats) -> tuple[Floats, Floats]:
+        value, rate = (basis(knots, degree, t, k) @ weighted for k in (0, 1))
+        points = value[:, :-1] / value[:, -1:]
+        return points, (rate[:, :-1] - points * rate[:, -1:]) / value[:, -1:]
+
+    return found
+
+
+def _values(point: object) -> tuple[float, float, float]:
+    return point.X(), point.Y(), point.Z()  # type: ignore[attr-defined]

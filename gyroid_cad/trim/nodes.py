@@ -1,0 +1,314 @@
+"""Places where an edge of one side meets a face of the other: rims of the wall's faces, and edges of the part.
+
+Each is found once, on its edge alone, and then belongs to every face round that edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from gyroid_cad.common.arrays import dot
+from gyroid_cad.errors import KernelError
+from gyroid_cad.nurbs.roots import roots
+from gyroid_cad.trim.boundary import Boundary
+from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, grouped
+
+__all__ = ["PartNodes", "RimNodes", "part_nodes", "rim_nodes"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+# Samples along a rim, as close as those of planes.
+_RIM_SAMPLES = 65
+# The sine of an angle at which an edge touches a face, and how near a corner a node may be, in parts of the edge.
+_TOUCHING, _AT_CORNER = 1e-6, 1e-6
+# Triangles along each side of a face, by which edges of the part are first looked for; how far beyond a triangle and a
+# segment one is tried, in parts of either.
+_TRIANGLES, _MARGIN = 8, 0.2
+_SEGMENT, _TURN, _MOST_SEGMENTS = 0.1, 0.15, 4096
+_NEWTON_STEPS = 20
+_AT_ONCE = 2**20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RimNodes:
+    """Where rims of the wall's faces cross the part's boundary, ordered by rim and along it.
+
+    Attributes
+    ----------
+    rim, part : ndarray of int, shape (nodes,)
+        Rims, and the part's faces there.
+    along : ndarray, shape (nodes,)
+        Parameter, in [-1, 1], the way the complex's edge runs.
+    inwards : ndarray of bool, shape (nodes,)
+        Whether one comes into the part there, running along.
+    places : ndarray, shape (nodes, 2)
+        Parameters of the part's face.
+    points : ndarray, shape (nodes, 3)
+    """
+
+    rim: Integers
+    part: Integers
+    along: Floats
+    inwards: Booleans
+    places: Floats
+    points: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PartNodes:
+    """Where edges of the part cross faces of the wall, ordered by edge and along it.
+
+    Attributes
+    ----------
+    edge, face : ndarray of int, shape (nodes,)
+        Edges of the part, and faces of the wall.
+    along : ndarray, shape (nodes,)
+        Parameter of the edge's curve.
+    upwards : ndarray of bool, shape (nodes,)
+        Whether the edge runs there to the side that the face's own normal points to.
+    places : ndarray, shape (nodes, 2)
+        Parameters of the wall's face.
+    points : ndarray, shape (nodes, 3)
+    """
+
+    edge: Integers
+    face: Integers
+    along: Floats
+    upwards: Booleans
+    places: Floats
+    points: Floats
+
+
+def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
+    """Find where rims cross the part's faces.
+
+    Parameters
+    ----------
+    pairs : Pairs
+    rims : ndarray of int, shape (faces, 4)
+        Number of the rim along each side of a face; two faces that share one give it the same number.
+    forward : ndarray of bool, shape (faces, 4)
+        Whether the rim runs the way the side of the square does.
+
+    Raises
+    ------
+    KernelError
+        If a rim only touches the part, or crosses it at an edge of the part or at a corner of the face.
+    """
+    # A rim is looked at on the first face that has it, against every face of the part that one of its faces may meet.
+    flat, first = np.unique(rims.ravel(), return_index=True)
+    owner, owned_side = np.divmod(first, 4)
+    index = np.searchsorted(flat, rims)
+    both = np.stack([np.repeat(index[pairs.face], 1, axis=0).ravel(), np.repeat(pairs.part, 4)], axis=1)
+    rim, part = np.unique(both, axis=0).T
+    step = 2 / (_RIM_SAMPLES - 1)
+    samples = np.linspace(-1 - step, 1 + step, _RIM_SAMPLES + 2)
+    asked = Pairs(pairs.faces, pairs.boundary, owner[rim], part)
+    values = _rough_heights(asked, owned_side[rim], samples, pairs.faces.size)
+
+    def along_side(which: Integers, along: Floats) -> tuple[Floats, Floats]:
+        u, v = square_points(owned_side[rim[which]], along)
+        height, slopes, _, _ = asked.heights(which, u[:, None], v[:, None])
+        return height[:, 0], _rate(owned_side[rim[which]], slopes[:, 0])
+
+    which, along = roots(samples, values, along_side)
+    side = owned_side[rim[which]]
+    u, v = square_points(side, along)
+    heights, slopes, places, points = (some[:, 0] for some in asked.heights(which, u[:, None], v[:, None]))
+    # Elsewhere a distance changes its sign by a leap, where another place of the surface becomes the nearest.
+    real = np.abs(heights) < 1e-8 * pairs.faces.size
+    real &= _in_faces(pairs.boundary, part[which], places, real)
+    which, along, side, slopes, places, points = (
+        some[real] for some in (which, along, side, slopes, places, points)
+    )
+    rate, steepness = _rate(side, slopes), np.linalg.norm(slopes, axis=1)
+    if np.any(np.abs(rate) <= _TOUCHING * steepness) or np.any(np.abs(along) > 1 - _AT_CORNER):
+        raise KernelError("an edge of the lattice touches the part")
+    runs_on = forward[owner[rim[which]], side]
+    along, inwards = np.where(runs_on, along, -along), np.where(runs_on, rate > 0, rate < 0)
+    order = np.lexsort((along, rim[which]))
+    which = which[order]
+    return RimNodes(flat[rim[which]], part[which], along[order], inwards[order], places[order], points[order])
+
+
+def _rough_heights(pairs: Pairs, side: Integers, samples: Floats, size: float) -> Floats:
+    """Heights along sides, exact where they are near zero; shape (pairs, samples)."""
+    u, v = square_points(side[:, None], samples[None])
+    points = pairs.faces.derivatives(pairs.face, u, v, 0)[0]
+    heights = np.empty(u.shape)
+    for part, rows in grouped(pairs.part):
+        face = pairs.boundary.faces[part]
+        flat = points[rows].reshape(-1, 3)
+        found, error = face.surface.roughly(flat)
+        near = np.flatnonzero((np.abs(found) <= 4 * error) & (error > 0) & (np.abs(found) < size))
+        if len(near):
+            found[near] = face.surface.distances(flat[near])[0]
+        heights[rows] = -face.sign * found.reshape(len(rows), -1)
+    return heights
+
+
+def _rate(side: Integers, slopes: Floats) -> Floats:
+    return np.choose(side, [slopes[:, 0], slopes[:, 1], -slopes[:, 0], -slopes[:, 1]])
+
+
+def _in_faces(boundary: Boundary, part: Integers, places: Floats, asked: Booleans) -> Booleans:
+    inside = np.zeros(len(part), dtype=bool)
+    some = np.flatnonzero(asked)
+    for number, rows in grouped(part[some]):
+        inside[some[rows]] = boundary.faces[number].contains(places[some[rows]])
+    return inside
+
+
+def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
+    """Find where edges of a part cross faces of the wall.
+
+    Raises
+    ------
+    KernelError
+        If an edge only touches a face, or crosses it at its rim.
+    """
+    edge, low, high, start, end = _segments(boundary, faces.size)
+    if not len(edge) or not len(faces):
+        none = np.zeros(0)
+        integers = np.zeros(0, dtype=np.int64)
+        return PartNodes(integers, integers, none, none > 0, np.zeros((0, 2)), np.zeros((0, 3)))
+    face, segment = _near(faces, start, end)
+    face, segment, along, u, v = _tried(faces, face, segment, start, end)
+    along = low[segment] + along * (high - low)[segment]
+    return _converged(faces, boundary, edge[segment], face, along, u, v)
+
+
+def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats, Floats, Floats]:
+    """Edges of the part as straight segments: their edges, parameters of both ends, and both ends."""
+    edges, lows, highs, starts, ends = [np.zeros(0, dtype=np.int64)], [], [], [], []
+    lows.append(np.zeros(0)), highs.append(np.zeros(0)), starts.append(np.zeros((0, 3))), ends.append(np.zeros((0, 3)))
+    for number, one in enumerate(boundary.edges):
+        if one.curve is None:
+            continue
+        points, rates = one.curve(np.linspace(one.first, one.last, 33))
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        along = rates / np.maximum(np.linalg.norm(rates, axis=1, keepdims=True), np.finfo(float).tiny)
+        turn = np.linalg.norm(np.diff(along, axis=0), axis=1).sum()
+        count = int(np.clip(np.ceil(max(length / (_SEGMENT * size), turn / _TURN)), 1, _MOST_SEGMENTS))
+        t = np.linspace(one.first, one.last, count + 1)
+        places = one.curve(t)[0]
+        edges.append(np.full(count, number))
+        for some, added in ((lows, t[:-1]), (highs, t[1:]), (starts, places[:-1]), (ends, places[1:])):
+            some.append(added)
+    return tuple(np.concatenate(some) for some in (edges, lows, highs, starts, ends))  # type: ignore[return-value]
+
+
+def _near(faces: LatticeFaces, start: Floats, end: Floats) -> tuple[Integers, Integers]:
+    """Faces with the segments whose boxes meet theirs."""
+    low, high = (reach(faces.nets, axis=(1, 2)) for reach in (np.min, np.max))
+    margin = _MARGIN * np.linalg.norm(end - start, axis=1).max()
+    middle = (low + high) / 2
+    radius = np.linalg.norm(high - low, axis=1) / 2 + np.linalg.norm(end - start, axis=1).max() / 2 + margin
+    found = cKDTree((start + end) / 2).query_ball_point(middle, radius)
+    counts = np.array([len(some) for some in found])
+    face = np.repeat(np.arange(len(faces)), counts)
+    segment = np.concatenate([np.asarray(some, dtype=np.int64) for some in found] or [np.zeros(0, dtype=np.int64)])
+    bottom, top = np.minimum(start, end) - margin, np.maximum(start, end) + margin
+    meets = np.all((low[face] <= top[segment]) & (high[face] >= bottom[segment]), axis=1)
+    return face[meets], segment[meets]
+
+
+def _tried(
+    faces: LatticeFaces, face: Integers, segment: Integers, start: Floats, end: Floats
+) -> tuple[Integers, Integers, Floats, Floats, Floats]:
+    """Segments that meet triangles of faces, or nearly so: where, along the segment and on the face."""
+    count = _TRIANGLES + 1
+    along = np.linspace(-1, 1, count)
+    corner = np.arange(_TRIANGLES)
+    i, j = (grid.ravel() for grid in np.meshgrid(corner, corner, indexing="ij"))
+    first = np.concatenate([i * count + j, (i + 1) * count + j + 1])
+    second = np.concatenate([(i + 1) * count + j, i * count + j + 1])
+    third = np.concatenate([i * count + j + 1, (i + 1) * count + j])
+    places = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
+    found = []
+    at_once = max(1, _AT_ONCE // len(first))
+    for some in np.split(np.arange(len(face)), range(at_once, len(face), at_once)):
+        used, which = np.unique(face[some], return_inverse=True)
+        points = faces.on_grid(used, count).reshape(len(used), -1, 3)
+        a = points[:, first][which]
+        b, c = points[:, second][which] - a, points[:, third][which] - a
+        origin = (start[segment[some], None] - a)
+        direction = (end - start)[segment[some], None]
+        across = np.cross(direction, c)
+        determinant = dot(b, across)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            p = dot(origin, across) / determinant
+            turned = np.cross(origin, b)
+            q = dot(direction, turned) / determinant
+            t = dot(c, turned) / determinant
+        hit = (p > -_MARGIN) & (q > -_MARGIN) & (p + q < 1 + _MARGIN) & (t > -_MARGIN) & (t < 1 + _MARGIN)
+        row, triangle = np.nonzero(hit)
+        origin_place = places[first[triangle]]
+        place = (
+            origin_place
+            + p[hit][:, None] * (places[second[triangle]] - origin_place)
+            + q[hit][:, None] * (places[third[triangle]] - origin_place)
+        )
+        found.append((face[some][row], segment[some][row], t[hit], place[:, 0], place[:, 1]))
+    return tuple(np.concatenate(some) for some in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def _converged(
+    faces: LatticeFaces, boundary: Boundary, edge: Integers, face: Integers, along: Floats, u: Floats, v: Floats
+) -> PartNodes:
+    """Exact places by Newton's method, each once."""
+    unknown = np.stack([along, u, v], axis=-1)
+    sharp = np.zeros(len(edge))
+    upwards = np.zeros(len(edge), dtype=bool)
+    left = np.zeros((len(edge), 3))
+    points = np.zeros((len(edge), 3))
+    for number, rows in grouped(edge):
+        curve = boundary.edges[number].curve
+        assert curve is not None
+        span = boundary.edges[number].last - boundary.edges[number].first
+        for step in range(_NEWTON_STEPS + 1):
+            place, rate = curve(unknown[rows, 0])
+            point, du, dv = (some[:, 0] for some in faces.derivatives(face[rows], *unknown[rows, 1:, None].transpose(1, 0, 2)))
+            normal = np.cross(du, dv)
+            left[rows], points[rows] = place - point, point
+            slope = dot(rate, normal) / np.maximum(
+                np.linalg.norm(rate, axis=1) * np.linalg.norm(normal, axis=1), np.finfo(float).tiny
+            )
+            sharp[rows], upwards[rows] = np.abs(slope), slope > 0
+            if step == _NEWTON_STEPS:
+                break
+            jacobian = np.stack([rate, -du, -dv], axis=-1)
+            jacobian[np.abs(slope) < 1e-12] = np.eye(3)
+            change = np.linalg.solve(jacobian, -(place - point)[..., None])[..., 0]
+            change[:, 0] = np.clip(change[:, 0], -span / 10, span / 10)
+            change[:, 1:] = np.clip(change[:, 1:], -0.2, 0.2)
+            unknown[rows] += change
+            unknown[rows, 1:] = np.clip(unknown[rows, 1:], -1.3, 1.3)
+            if np.abs(change[:, 1:]).max(initial=0.0) < 1e-14:
+                break
+    first, last = (np.array([getattr(boundary.edges[k], name) for k in edge.tolist()]) for name in ("first", "last"))
+    t = (unknown[:, 0] - first) / (last - first)
+    size = faces.size
+    solved = np.linalg.norm(left, axis=1) < 1e-9 * size
+    edge_margin = np.maximum(np.abs(unknown[:, 1:]).max(axis=1) - 1, np.maximum(-t, t - 1))
+    solved &= edge_margin < _AT_CORNER
+    if np.any(solved & (edge_margin > -_AT_CORNER)) or np.any(sharp[solved] < _TOUCHING):
+        raise KernelError("an edge of the part touches the lattice, or meets an edge of it")
+    keep = np.flatnonzero(solved)
+    order = keep[np.lexsort((t[keep], face[keep], edge[keep]))]
+    fresh = np.ones(len(order), dtype=bool)
+    fresh[1:] = (
+        (edge[order][1:] != edge[order][:-1])
+        | (face[order][1:] != face[order][:-1])
+        | (np.linalg.norm(np.diff(points[order], axis=0), axis=1) > 1e-7 * size)
+    )
+    order = order[fresh]
+    order = order[np.lexsort((t[order], edge[order]))]
+    return PartNodes(edge[order], face[order], unknown[order, 0], upwards[order], unknown[order, 1:], points[order])

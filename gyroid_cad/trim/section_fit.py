@@ -1,0 +1,150 @@
+"""Followed curves as splines: in the parameters of both faces and in space, with one parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.trim.lattice_faces import Pairs, grouped
+from gyroid_cad.trim.paths import Paths
+from gyroid_cad.trim.sections import section_knots
+
+__all__ = ["SectionCurve", "fitted_sections"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
+_STATIONS = (8, 16, 32, 64, 128)
+_CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
+_NEWTON_STEPS = 8
+_WORST_CONDITION = 1e3
+# How far from its stations a curve in the square may swing between them, in the length of all.
+_WIDEST = 1.2
+_AT_ONCE = 256
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectionCurve:
+    """A curve in which a face of the wall crosses one of the part.
+
+    Attributes
+    ----------
+    pair : int
+    start, end : int
+        Nodes; -1 if it closes.
+    in_square, in_space, on_part : ndarray, shape (m, 2), (m, 3), (m, 2)
+        Control points on the knots of :func:`~gyroid_cad.trim.sections.section_knots`.
+    deviation : float
+        Of the three from each other, in mm.
+    """
+
+    pair: int
+    start: int
+    end: int
+    in_square: Floats
+    in_space: Floats
+    on_part: Floats
+    deviation: float
+
+
+def fitted_sections(pairs: Pairs, paths: Paths, cell_size: float) -> list[SectionCurve]:
+    """Fit curves that were followed, each with as few control points as keep the splines together.
+
+    Parameters
+    ----------
+    pairs : Pairs
+    paths : Paths
+    cell_size : float
+        In mm, by which closeness is measured.
+
+    Raises
+    ------
+    KernelError
+        If one is not close with the most control points.
+    """
+    control: list[Floats] = [np.zeros((0, 7))] * len(paths.pair)
+    deviation = np.full(len(paths.pair), np.inf)
+    left = np.arange(len(paths.pair))
+    for count in _STATIONS:
+        for some in np.split(left, range(_AT_ONCE, len(left), _AT_ONCE)):
+            if len(some):
+                made, off = _fitted(pairs, paths, some, count)
+                for index, path in enumerate(some.tolist()):
+                    control[path], deviation[path] = made[index], off[index]
+        left = left[deviation[left] > _CLOSE * cell_size]
+        if not len(left):
+            break
+    worst = deviation.max(initial=0.0)
+    if not worst <= _NEAR_ENOUGH * cell_size:
+        raise KernelError(f"a curve where the lattice crosses the part was fitted to {worst:.2g} mm only")
+    ends = zip(paths.pair.tolist(), paths.start.tolist(), paths.end.tolist(), strict=True)
+    return [
+        SectionCurve(pair, start, end, some[:, :2], some[:, 2:5], some[:, 5:], float(off))
+        for (pair, start, end), some, off in zip(ends, control, deviation, strict=True)
+    ]
+
+
+def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Floats, Floats]:
+    """Control points, in the square, in space and on the part's face, and how far the three are apart."""
+    even = np.linspace(0, 1, count + 1)
+    pair = paths.pair[which]
+    ways = [np.hstack([paths.places[k], paths.near[k]]) for k in which.tolist()]
+    ends = np.array([[way[0], way[-1]] for way in ways])
+    stations = np.array([_spread(way, _run(way[:, :2]), even) for way in ways])
+    points, stations = _onto_curve(pairs, pair, stations, ends)
+    stations = np.array([_spread(way, _run(some), even) for way, some in zip(stations, points, strict=True)])
+    points, stations = _onto_curve(pairs, pair, stations, ends)
+    t = np.array([_run(some) for some in points])
+    through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(which), count + 1, count + 1)
+    crowded = ~np.all(np.isfinite(t), axis=1)
+    through[crowded] = np.eye(count + 1)
+    crowded |= np.linalg.cond(through) > _WORST_CONDITION
+    through[crowded] = np.eye(count + 1)
+    control = np.linalg.solve(through, np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1))
+    between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
+    astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
+    u, v = np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1)
+    exact = pairs.faces.derivatives(pairs.face[pair], u, v, 0)[0]
+    deviation = np.linalg.norm(exact - between[..., 2:5], axis=-1).max(axis=1)
+    for part, rows in grouped(pairs.part[pair]):
+        surface = pairs.boundary.faces[part].surface
+        on_part = surface.points(between[rows, :, 5:].reshape(-1, 2)).reshape(len(rows), -1, 3)
+        off = np.linalg.norm(on_part - between[rows, :, 2:5], axis=-1).max(axis=1)
+        deviation[rows] = np.maximum(deviation[rows], off)
+    return control, np.where(crowded | astray | ~np.isfinite(deviation), np.inf, deviation)
+
+
+def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) -> tuple[Floats, Floats]:
+    """Points of stations moved onto the curve, and those stations; the first and last are what they are."""
+    stations = stations.copy()
+    stations[:, [0, -1]] = ends
+    near = stations[..., 2:]
+    points = np.zeros((*stations.shape[:2], 3))
+    for _ in range(_NEWTON_STEPS):
+        heights, slopes, near, points = pairs.heights(pair, stations[..., 0], stations[..., 1], near)
+        steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
+        step = -slopes * (heights / steepness)[..., None]
+        step[:, [0, -1]] = 0
+        length = np.linalg.norm(step, axis=-1, keepdims=True)
+        if length.max(initial=0.0) < 1e-13:
+            break
+        stations[..., :2] += step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1))
+    stations[..., 2:] = near
+    return points, stations
+
+
+def _run(points: Floats) -> Floats:
+    """Length of the chords up to each point, in parts of all."""
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(run / run[-1])
+
+
+def _spread(way: Floats, run: Floats, t: Floats) -> Floats:
+    """Places of a way at parameters t, where its own points have parameters ``run``."""
+    return np.stack([np.interp(t, run, column) for column in way.T], axis=-1)

@@ -1,0 +1,206 @@
+"""Surfaces of a part as functions of place: the signed distance from each, in closed form where it has one.
+
+Plane, cylinder, cone, sphere and torus are known at once. Of any other surface the nearest place is found by Newton's
+method from the nearest of many samples; what lies off its border is measured from the surface that goes on there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from gyroid_cad.common.arrays import dot, unit
+from gyroid_cad.nurbs.roots import foot_step
+
+__all__ = ["FreeForm", "Quadric", "QuadricKind", "Surface"]
+
+Floats = NDArray[np.float64]
+QuadricKind = Literal["plane", "cylinder", "cone", "sphere", "torus"]
+
+# Newton's method to the nearest place, in parts of the parameters' ranges.
+_STEPS, _CONVERGED, _LONGEST_STEP = 12, 1e-13, 0.05
+# How far past its border a surface is followed, and how many samples it has along each side.
+_BEYOND, _SAMPLES = 0.02, 65
+
+
+class Surface(Protocol):
+    """A surface with parameters s and t, and what is known of any place near it."""
+
+    def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+        """Signed distances (n,) in mm, their gradients (n, 3), and the parameters (n, 2) of the nearest places.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            In mm.
+        near : ndarray, shape (n, 2), optional
+            Parameters close to those looked for.
+        """
+        ...
+
+    def roughly(self, points: Floats) -> tuple[Floats, Floats]:
+        """Signed distances (n,), and how far off at most each is where it is near zero, in mm."""
+        ...
+
+    def points(self, places: Floats) -> Floats:
+        """Points (n, 3) at parameters (n, 2)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quadric:
+    """A plane, cylinder, cone, sphere or torus, with the parameters that the kernel gives it.
+
+    Attributes
+    ----------
+    kind : str
+    origin : ndarray, shape (3,)
+    axes : ndarray, shape (3, 3)
+        Its directions x, y and z, in the rows.
+    radius, second : float
+        Of a torus the larger and the smaller one; of a cone the radius at the origin, and half the angle, in radians.
+    """
+
+    kind: QuadricKind
+    origin: Floats
+    axes: Floats
+    radius: float = 0.0
+    second: float = 0.0
+
+    def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+        """As of :class:`Surface`."""
+        own = (points - self.origin) @ self.axes.T
+        x, y, z = own.T
+        if self.kind == "plane":
+            return z, np.broadcast_to(self.axes[2], own.shape), own[:, :2]
+        along = np.hypot(x, y)
+        safe = np.maximum(along, np.finfo(float).tiny)
+        radial = np.stack([x / safe, y / safe, np.zeros_like(x)], axis=-1)
+        upwards = np.array([0.0, 0.0, 1.0])
+        angle = np.arctan2(y, x)
+        if self.kind == "cylinder":
+            found, gradient, height = along - self.radius, radial, z
+        elif self.kind == "cone":
+            sine, cosine = np.sin(self.second), np.cos(self.second)
+            found = (along - self.radius) * cosine - z * sine
+            gradient, height = cosine * radial - sine * upwards, (along - self.radius) * sine + z * cosine
+        elif self.kind == "sphere":
+            found, gradient, height = np.hypot(along, z) - self.radius, unit(own), np.arctan2(z, along)
+        else:
+            out = along - self.radius
+            found, height = np.hypot(out, z) - self.second, np.arctan2(z, out)
+            gradient = unit(out[:, np.newaxis] * radial + z[:, np.newaxis] * upwards)
+        sign = self._handed
+        return sign * found, sign * gradient @ self.axes, np.stack([angle, height], axis=-1)
+
+    def roughly(self, points: Floats) -> tuple[Floats, Floats]:
+        """As of :class:`Surface`: exact."""
+        found = self.distances(points)[0]
+        return found, np.zeros(len(found))
+
+    def points(self, places: Floats) -> Floats:
+        """As of :class:`Surface`."""
+        s, t = places.T
+        if self.kind == "plane":
+            own = np.stack([s, t, np.zeros_like(s)], axis=-1)
+        else:
+            along, z = self._profile(t)
+            own = np.stack([along * np.cos(s), along * np.sin(s), z], axis=-1)
+        return np.asarray(self.origin + own @ self.axes)
+
+    @property
+    def _handed(self) -> float:
+        """-1 if the axes are left-handed: then the normal of the parameters points inwards."""
+        return 1.0 if np.linalg.det(self.axes) > 0 else -1.0
+
+    def _profile(self, t: Floats) -> tuple[Floats, Floats]:
+        """Distance from the axis, and along it."""
+        if self.kind == "cylinder":
+            return np.full_like(t, self.radius), t
+        if self.kind == "cone":
+            return self.radius + t * np.sin(self.second), t * np.cos(self.second)
+        if self.kind == "sphere":
+            return self.radius * np.cos(t), self.radius * np.sin(t)
+        return self.radius + self.second * np.cos(t), self.second * np.sin(t)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeForm:
+    """Any other surface, by its derivatives.
+
+    Attributes
+    ----------
+    derivatives : callable
+        From parameters s, t, shape (n,), to points and derivatives by s, t, ss, st and tt, each of shape (n, 3).
+    low, high : ndarray, shape (2,)
+        Of the parameters.
+    """
+
+    derivatives: Callable[[Floats, Floats], tuple[Floats, ...]]
+    low: Floats
+    high: Floats
+
+    def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+        """As of :class:`Surface`."""
+        places = np.array(self._samples[0][self._tree.query(points)[1]] if near is None else near, dtype=float)
+        reach = self.high - self.low
+        low, high = self.low - _BEYOND * reach, self.high + _BEYOND * reach
+        left = np.arange(len(points))
+        for _ in range(_STEPS):
+            found = self.derivatives(*places[left].T)
+            step = _nearer(points[left] - found[0], found)
+            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(step / reach).max(axis=1), _LONGEST_STEP))[:, None]
+            moved = np.clip(places[left] + step, low, high)
+            change = np.abs((moved - places[left]) / reach).max(axis=1)
+            places[left] = moved
+            left = left[change > _CONVERGED]
+            if not len(left):
+                break
+        x, ds, dt, *_ = self.derivatives(*places.T)
+        normals = unit(np.cross(ds, dt))
+        return dot(points - x, normals), normals, places
+
+    def roughly(self, points: Floats) -> tuple[Floats, Floats]:
+        """As of :class:`Surface`: from the tangent plane at the nearest sample."""
+        distance, nearest = self._tree.query(points)
+        _, at, normals, bend = self._samples
+        return dot(points - at[nearest], normals[nearest]), np.asarray(bend * distance**2 + 1e-12)
+
+    def points(self, places: Floats) -> Floats:
+        """As of :class:`Surface`."""
+        return self.derivatives(*places.T)[0]
+
+    @cached_property
+    def _samples(self) -> tuple[Floats, Floats, Floats, float]:
+        """Parameters, points and normals of a grid, and half the largest curvature there."""
+        along = [np.linspace(low, high, _SAMPLES) for low, high in zip(self.low, self.high, strict=True)]
+        places = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 2)
+        x, ds, dt, dss, dst, dtt = self.derivatives(*places.T)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            normals = unit(np.cross(ds, dt))
+            bends = [np.abs(dot(second, normals)) / squared for second, squared in (
+                (dss, dot(ds, ds)), (dtt, dot(dt, dt)), (dst, np.sqrt(dot(ds, ds) * dot(dt, dt))))]
+        sound = np.isfinite(normals).all(axis=1)
+        bend = float(np.max([np.max(some[np.isfinite(some)], initial=0.0) for some in bends]))
+        return places[sound], x[sound], normals[sound], bend
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._samples[1])
+
+
+def _nearer(apart: Floats, found: tuple[Floats, ...]) -> Floats:
+    """A step of Newton's method to the nearest place; of Gauss's and Newton's past the centre of curvature."""
+    ds, dt, *bends = found[1:]
+    du, dv, sound = foot_step(apart, ds, dt, *bends)
+    a, b, c = dot(ds, ds), dot(ds, dt), dot(dt, dt)
+    determinant = np.maximum(a * c - b * b, np.finfo(float).tiny)
+    along_s, along_t = dot(apart, ds), dot(apart, dt)
+    plain = np.stack([(c * along_s - b * along_t) / determinant, (a * along_t - b * along_s) / determinant], axis=-1)
+    return np.where(sound[:, np.newaxis], np.stack([du, dv], axis=-1), plain)

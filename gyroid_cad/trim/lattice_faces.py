@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
-from gyroid_cad.nurbs.surface import grid_points, point_derivatives
+from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.nurbs.surface import edge_row, grid_points, point_derivatives
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.wall.offset import Wall
 
@@ -57,6 +58,18 @@ class LatticeFaces:
         """Points and derivatives of faces (m,) at parameters (m, q); each of shape (m, q, 3)."""
         wall = self.wall
         return point_derivatives(self.nets[face], wall.weights, (wall.knots, wall.knots), u, v, order)
+
+    def along_sides(self, faces: Integers, sides: Integers, along: Floats) -> Floats:
+        """Points of one side each of faces (m,), at parameters (q,) as one runs round the square; shape (m, q, 3)."""
+        wall = self.wall
+        points = np.empty((len(faces), len(along), 3))
+        for side in range(4):
+            rows = np.flatnonzero(sides == side)
+            weights = edge_row(wall.weights, side)
+            net = edge_row(np.moveaxis(self.nets[faces[rows]], 0, 2), side) * weights[:, None, None]
+            functions = basis(wall.knots if side < 2 else -wall.knots[::-1], 3, along)
+            points[rows] = np.moveaxis(np.tensordot(functions, net, 1), 1, 0) / (functions @ weights)[:, None]
+        return points
 
     def on_grid(self, faces: Integers, count: int) -> Floats:
         """Points on an even grid of parameters; shape (m, count, count, 3)."""
@@ -135,6 +148,8 @@ def pairs_of(faces: LatticeFaces, boundary: Boundary) -> Pairs:
 
 def grouped(numbers: Integers) -> list[tuple[int, Integers]]:
     """Distinct numbers, each with where it stands."""
+    if not len(numbers):
+        return []
     order = np.argsort(numbers, kind="stable")
     distinct, first = np.unique(numbers[order], return_index=True)
     return list(zip(distinct.tolist(), np.split(order, first[1:]), strict=True))

@@ -140,9 +140,8 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
 
 def _rough_heights(pairs: Pairs, side: Integers, samples: Floats, size: float) -> Floats:
     """Heights along sides, exact where they are near zero; shape (pairs, samples)."""
-    u, v = square_points(side[:, None], samples[None])
-    points = pairs.faces.derivatives(pairs.face, u, v, 0)[0]
-    heights = np.empty(u.shape)
+    points = pairs.faces.along_sides(pairs.face, side, samples)
+    heights = np.empty(points.shape[:2])
     for part, rows in grouped(pairs.part):
         face = pairs.boundary.faces[part]
         flat = points[rows].reshape(-1, 3)

@@ -134,15 +134,17 @@ def _followed(
         short = live[~good]
         step[short] /= 2
         go = live[good]
-        hit, first = _hit(targets[go], place[go], tried[good], step[go], ends)
-        for row, path in enumerate(go.tolist()):
-            if hit[row] >= 0:
-                reached[path] = hit[row]
-                paths[path].append(ends.places[hit[row]])
-                nears[path].append(ends.near[hit[row]])
-            else:
-                paths[path].append(tried[good][row])
-                nears[path].append(tried_near[good][row])
+        hit = _hit(targets[go], place[go], tried[good], step[go], ends)
+        reached[go] = hit
+        done = (hit >= 0)[:, None]
+        for path, square, part in zip(
+            go.tolist(),
+            np.where(done, ends.places[hit], tried[good]),
+            np.where(done, ends.near[hit], tried_near[good]),
+            strict=True,
+        ):
+            paths[path].append(square)
+            nears[path].append(part)
         travelled[go] += step[go]
         place[go], onward[go], near[go] = tried[good], there[good], tried_near[good]
         step[go] = np.where(turn[good] < _TURN / 3, np.minimum(1.5 * step[go], longest), step[go])
@@ -189,10 +191,10 @@ def _step(
     return tried, there, near_there, (moved < _ASTRAY * length) & (np.linalg.norm(back, axis=1) < 1e-3 * length)
 
 
-def _hit(targets: Integers, before: Floats, after: Floats, step: Floats, ends: Ends) -> tuple[Integers, Floats]:
-    """The first target that lies on each step, -1 if none does, and where."""
+def _hit(targets: Integers, before: Floats, after: Floats, step: Floats, ends: Ends) -> Integers:
+    """The first target that lies on each step, -1 if none does."""
     if not len(targets):
-        return np.zeros(0, dtype=np.int64), np.zeros(0)
+        return np.zeros(0, dtype=np.int64)
     along = after - before
     squared = np.maximum(np.sum(along * along, axis=1), np.finfo(float).tiny)[:, None]
     away = ends.places[targets] - before[:, None]
@@ -202,7 +204,7 @@ def _hit(targets: Integers, before: Floats, after: Floats, step: Floats, ends: E
     t = np.where(on, t, np.inf)
     first = np.argmin(t, axis=1)
     rows = np.arange(len(targets))
-    return np.where(on[rows, first], targets[rows, first], -1), t[rows, first]
+    return np.where(on[rows, first], targets[rows, first], -1)
 
 
 def closed_paths(pairs: Pairs, known: Paths) -> Paths:

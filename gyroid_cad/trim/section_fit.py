@@ -22,7 +22,10 @@ Integers = NDArray[np.int64]
 _STATIONS = (8, 16, 32, 64, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
 _NEWTON_STEPS = 8
-_WORST_CONDITION = 1e3
+# So many functions on either side of its own do not vanish at a station that is nearly in its even place.
+_BAND = 4
+# In steps between stations.
+_UNEVEN = 0.75
 # How far from its stations a curve in the square may swing between them, in the length of all.
 _WIDEST = 1.2
 _AT_ONCE = 256
@@ -101,11 +104,12 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     points, stations = _onto_curve(pairs, pair, stations, ends)
     t = np.array([_run(some) for some in points])
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(which), count + 1, count + 1)
+    # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney):
+    # nearly even ones do.
     crowded = ~np.all(np.isfinite(t), axis=1)
+    crowded |= np.abs(t - even).max(axis=1) * count > _UNEVEN
     through[crowded] = np.eye(count + 1)
-    crowded |= np.linalg.cond(through) > _WORST_CONDITION
-    through[crowded] = np.eye(count + 1)
-    control = np.linalg.solve(through, np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1))
+    control = _solved(through, np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1))
     between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
     astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
     u, v = np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1)
@@ -136,6 +140,25 @@ def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) ->
         stations[..., :2] += step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1))
     stations[..., 2:] = near
     return points, stations
+
+
+def _solved(through: Floats, values: Floats) -> Floats:
+    """Solutions of many systems at once, by elimination in the band that a spline's functions leave.
+
+    Without pivots, for a matrix of B-splines is totally positive (de Boor and Pinkus).
+    """
+    through, values = through.copy(), values.copy()
+    count = through.shape[1]
+    for k in range(count - 1):
+        rows, columns = slice(k + 1, k + 1 + _BAND), slice(k, k + 1 + 2 * _BAND)
+        factor = through[:, rows, k] / through[:, [k], k]
+        through[:, rows, columns] -= factor[..., None] * through[:, [k], columns]
+        values[:, rows] -= factor[..., None] * values[:, [k]]
+    for k in range(count - 1, -1, -1):
+        above = slice(k + 1, k + 1 + 2 * _BAND)
+        values[:, k] -= np.einsum("mj,mjc->mc", through[:, k, above], values[:, above])
+        values[:, k] /= through[:, k, k, None]
+    return values
 
 
 def _run(points: Floats) -> Floats:

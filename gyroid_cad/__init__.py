@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         IslandsWarning,
         KernelError,
         ParameterError,
+        SealedVoidsWarning,
         SelfIntersectionError,
     )
     from gyroid_cad.fields.field import Field
@@ -55,6 +56,7 @@ __all__ = [
     "ParameterError",
     "PrintCheck",
     "Printer",
+    "SealedVoidsWarning",
     "SelfIntersectionError",
     "VolumePatches",
     "__version__",
@@ -72,6 +74,7 @@ _HOMES = {
         "IslandsWarning",
         "KernelError",
         "ParameterError",
+        "SealedVoidsWarning",
         "SelfIntersectionError",
     ),
     "fields.field": ("Field",),

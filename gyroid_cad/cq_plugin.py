@@ -109,6 +109,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     origin: Point = (0.0, 0.0, 0.0),
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
@@ -125,8 +126,8 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin, openings, origin, rotation, fit, drop_islands, keep_islands, tolerance, \
-    lattice, surface
+    cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
+    tolerance, lattice, surface
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -164,6 +165,7 @@ def gyroid_fill(
         drop_islands,
         skin=skin,
         openings=[*openings, *selected],
+        core=core,
         tolerance=tolerance,
         lattice=lattice,
         surface=surface,

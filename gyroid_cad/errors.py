@@ -16,6 +16,7 @@ __all__ = [
     "KernelError",
     "MissingHostError",
     "ParameterError",
+    "SealedVoidsWarning",
     "SelfIntersectionError",
     "host_import",
 ]
@@ -240,6 +241,20 @@ class IslandsWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore", IslandsWarning)
     ...     solid = Lattice((1, 1, 1), 10, density=0.2, trim="box").solid()
+    """
+
+
+class SealedVoidsWarning(UserWarning):
+    """A filled part encloses space that nothing, no resin and no powder, can leave.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, SealedVoidsWarning, fill
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", SealedVoidsWarning)
+    ...     filled = fill(cq.Workplane().box(4, 4, 4), 8, density=0.2, skin=0.5, fit=FitSettings(5))
     """
 
 

@@ -20,13 +20,14 @@ from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import Infill, block_infill, endless_infill, require_cover
-from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
+from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport
-from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, grams_of, regions_of, skin_of
+from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of, regions_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part, selected_faces
+from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
@@ -36,7 +37,7 @@ from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
-from gyroid_cad.trim.islands import Islands, island_rule
+from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_of_voids
 from gyroid_cad.wall.covering import Frame, frame_of, placement
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
 
@@ -182,6 +183,7 @@ def fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
@@ -218,6 +220,9 @@ def fill(
     openings : sequence
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it.
+    core : shape, Workplane or path-like, optional
+        Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
+        core, open wherever the core comes to the part's boundary.
     tolerance : float, optional
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
@@ -249,11 +254,7 @@ def fill(
     """
     frame = frame_of(*placement(origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
-    shell = None if skin is None else skin_of(skin)
-    if openings and shell is None:
-        raise ParameterError("openings", openings, "none without a skin")
-    if shell is not None and kind == SURFACE:
-        raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
+    shell = checked_skin(skin, openings, core, kind)
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
@@ -263,14 +264,23 @@ def fill(
     whole = part_of(part)
     if lattice is None:
         require_cover(whole.low, whole.high, size, settings.control_points)
-    hollow = None if shell is None else hollowed(whole, shell, selected_faces(whole, openings))
-    core = whole if hollow is None else hollow.core
-    filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
+    hollow = _hollow(whole, shell, openings, core)
+    inner = whole if hollow is None else hollow.core
+    filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(inner, f, timed), size, progress)
     outcome = filling.run(frame)
     domains, islands = without_islands(outcome.domains, filling.cells, rule)
-    made = _reported(filling, replace(outcome, domains=domains), islands, kind, shell, grams)
+    domains, voids = without_specks(domains, filling)
+    made = _reported(filling, replace(outcome, domains=domains), islands, voids, kind, grams)
     islands.warn("drop_islands drops")
+    warn_of_voids(voids)
     return made
+
+
+def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) -> Hollow | None:
+    """The part in skin and core, if it has a skin."""
+    if core is not None:
+        return hollow_round(part, part_of(core, "core"))
+    return None if skin is None else hollowed(part, skin, selected_faces(part, openings))
 
 
 _InfillIn = Callable[["Part", Frame, Callable[[str], AbstractContextManager[None]]], Infill]
@@ -318,10 +328,16 @@ def _described(
 
 
 def _reported(
-    filling: Filling, outcome: Outcome, islands: Islands, kind: Kind, skin: float | None, grams: float | None
+    filling: Filling,
+    outcome: Outcome,
+    islands: Islands,
+    voids: tuple[SealedVoid, ...],
+    kind: Kind,
+    grams: float | None,
 ) -> Filled:
 
     domains = outcome.domains
+    skin = None if filling.hollow is None else filling.hollow.thickness
     shapes = {
         name: some[0].shape if len(some) == 1 else compound_of(made.shape for made in some)
         for name, some in domains.items()
@@ -350,6 +366,7 @@ def _reported(
         islands_volume=islands.kept_volume,
         dropped=islands.dropped,
         dropped_volume=islands.dropped_volume,
+        voids=voids,
         cut_patches=outcome.cut,
         whole_patches=outcome.whole,
         by_sections=outcome.by_sections,

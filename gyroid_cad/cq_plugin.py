@@ -117,6 +117,7 @@ def gyroid_fill(
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
+    solids: Sequence[str | int] = (),
 ) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
@@ -126,7 +127,7 @@ def gyroid_fill(
     Parameters
     ----------
     cell_size, thickness, density, kind, skin, openings, origin, rotation, fit, drop_islands, keep_islands, tolerance, \
-    lattice, surface
+    lattice, surface, solids
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -168,6 +169,7 @@ def gyroid_fill(
         lattice=lattice,
         surface=surface,
         keep_islands=keep_islands,
+        solids=solids,
     )
     for name, domain in made.domains.items():
         self.newObject([cq.Shape.cast(domain)]).tag(name)

@@ -95,6 +95,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "may be repeated.",
 )
 @click.option(
+    "--solid",
+    multiple=True,
+    metavar="NAME",
+    help="Fill only the solids of the part that have this name, or this number; may be repeated.",
+)
+@click.option(
     "--drop-islands",
     is_flag=True,
     help="Drop all pieces not connected to the largest one; small ones, of less than a hundredth of what a cell holds, "
@@ -125,6 +131,7 @@ def fill_command(
     \b
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --skin 1 --opening ">Z"
+    gyroid-cad fill machine.step -o light.step --cell-size 7 --density 0.30 --solid bracket
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
     gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
     gyroid-cad fill fill.toml
@@ -184,6 +191,7 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     """
     own = {name: given[name] for name in _OWN}
     own["openings"] = [_face(opening) for opening in given["opening"]]
+    own["solids"] = given["solid"]
     if given["cells"] is not None:
         return {**own, "lattice": lattice_of(given)}
     of_blocks = [name for name in (*PAPER_OPTIONS, "scale_field", "map") if given[name] is not None]

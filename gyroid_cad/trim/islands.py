@@ -11,7 +11,7 @@ from typing import Literal
 
 from gyroid_cad.errors import IslandsWarning, ParameterError
 
-__all__ = ["SMALL_ISLAND", "IslandRule", "Islands", "island_rule", "islands_of", "kept_pieces"]
+__all__ = ["SMALL_ISLAND", "IslandRule", "Islands", "island_rule", "islands_of", "kept_pieces", "warn_caller"]
 
 IslandRule = Literal["drop small", "drop all", "keep all"]
 
@@ -52,7 +52,7 @@ class Islands:
             said.append(f"{_counted(self.kept)}, {self.kept_volume:.4g} mm3 in all: left{remedy and f' ({remedy})'}")
         if said:
             text = "not connected to the largest piece: " + "; ".join(said)
-            warnings.warn(text, IslandsWarning, stacklevel=_levels_within())
+            warn_caller(text, IslandsWarning)
 
 
 def island_rule(keep_islands: bool, drop_islands: bool = False) -> IslandRule:
@@ -109,10 +109,10 @@ def _counted(number: int) -> str:
     return "1 island" if number == 1 else f"{number} islands"
 
 
-def _levels_within() -> int:
-    """Levels of the stack from a warning's own function to the first that is not of this package."""
+def warn_caller(text: str, category: type[Warning]) -> None:
+    """Emit a warning at the line that called this package."""
     package = __name__.partition(".")[0]
-    level, frame = 1, sys._getframe(1)
+    level, frame = 1, sys._getframe(0)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
-    return level
+    warnings.warn(text, category, stacklevel=level)

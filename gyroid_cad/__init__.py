@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         IslandsWarning,
         KernelError,
         ParameterError,
+        PartWarning,
         SealedVoidsWarning,
         SelfIntersectionError,
     )
@@ -54,6 +55,7 @@ __all__ = [
     "LatticeReport",
     "Mesh",
     "ParameterError",
+    "PartWarning",
     "PrintCheck",
     "Printer",
     "SealedVoidsWarning",
@@ -74,6 +76,7 @@ _HOMES = {
         "IslandsWarning",
         "KernelError",
         "ParameterError",
+        "PartWarning",
         "SealedVoidsWarning",
         "SelfIntersectionError",
     ),

@@ -101,6 +101,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     help="Instead of --skin, the inner solid that is filled, of a STEP or BREP file: the skin is the part less it.",
 )
 @click.option(
+    "--solid",
+    multiple=True,
+    metavar="NAME",
+    help="Fill only the solids of the part that have this name, or this number; may be repeated.",
+)
+@click.option(
     "--drop-islands",
     is_flag=True,
     help="Drop all pieces not connected to the largest one; small ones, of less than a hundredth of what a cell holds, "
@@ -132,6 +138,7 @@ def fill_command(
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --skin 1 --opening ">Z"
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --core inner.step
+    gyroid-cad fill machine.step -o light.step --cell-size 7 --density 0.30 --solid bracket
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
     gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
     gyroid-cad fill fill.toml
@@ -192,6 +199,7 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     """
     own = {name: given[name] for name in _OWN}
     own["openings"] = [_face(opening) for opening in given["opening"]]
+    own["solids"] = given["solid"]
     if given["cells"] is not None:
         return {**own, "lattice": lattice_of(given)}
     of_blocks = [name for name in (*PAPER_OPTIONS, "scale_field", "map") if given[name] is not None]

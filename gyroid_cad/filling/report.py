@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from gyroid_cad.common.arrays import Point
@@ -10,7 +11,23 @@ from gyroid_cad.common.choices import Kind
 from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
 from gyroid_cad.trim.islands import SealedVoid
 
-__all__ = ["FillReport"]
+__all__ = ["FillReport", "joint_report"]
+
+# Of several bodies these add up.
+_SUMMED = (
+    "solids",
+    "faces",
+    "part_volume",
+    "volume",
+    "area",
+    "islands",
+    "islands_volume",
+    "dropped",
+    "dropped_volume",
+    "cut_patches",
+    "whole_patches",
+)
+_MASSES = ("mass", "part_mass")
 
 # In the table; the report has all of them.
 _VOIDS_SHOWN = 3
@@ -58,6 +75,10 @@ class FillReport:
         By stage.
     cells_alike : bool
         False where a scale field or a map makes cells of other sizes.
+    bodies : int
+        Solids of the part, each of which was filled by itself.
+    remarks : tuple of str
+        On what was repaired or united before that.
 
     Examples
     --------
@@ -99,6 +120,8 @@ class FillReport:
     shift: Point
     seconds: dict[str, float]
     cells_alike: bool
+    bodies: int = 1
+    remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -112,6 +135,8 @@ class FillReport:
             ("kind", f"{self.kind}, {cell_shown(self.cell_size, self.cells_alike)}, wall {self.thickness:.6g} mm"),
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
             *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
+            *([] if self.bodies == 1 else [("bodies", f"{self.bodies}, each filled by itself")]),
+            *(("part", remark) for remark in self.remarks),
             ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
             ("area", f"{self.area:.6g} mm2"),
@@ -127,3 +152,35 @@ class FillReport:
 
     def __str__(self) -> str:
         return text_table(self.rows())
+
+
+def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:
+    """Report on several bodies together, each of which was filled by itself.
+
+    Parameters
+    ----------
+    reports : sequence of FillReport
+        One of each body.
+    remarks : sequence of str
+        On what was done to the part before.
+    """
+    first, remarks = reports[0], tuple(remarks)
+    if len(reports) == 1:
+        return replace(first, remarks=remarks)
+    sums = {name: sum(getattr(report, name) for report in reports) for name in _SUMMED}
+    masses = {name: sum(getattr(report, name) for report in reports) for name in _MASSES if first.mass is not None}
+    stages = dict.fromkeys(stage for report in reports for stage in report.seconds)
+    return replace(
+        first,
+        **sums,
+        **masses,
+        thickness=max(report.thickness for report in reports),
+        min_wall=min((report.min_wall for report in reports if report.min_wall is not None), default=None),
+        density=sums["volume"] / sums["part_volume"],
+        by_sections=all(report.by_sections for report in reports),
+        shift=next((report.shift for report in reports if any(report.shift)), first.shift),
+        seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},
+        voids=tuple(sorted((void for report in reports for void in report.voids), key=lambda void: -void.volume)),
+        bodies=len(reports),
+        remarks=remarks,
+    )

@@ -29,7 +29,7 @@ from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.split import Change, Pieces, general_fuse, inner_sides, modified, solids_of
 
-__all__ = ["Hollow", "hollow", "hollow_round", "openings_of"]
+__all__ = ["Hollow", "has_face", "hollow", "hollow_round", "openings_of"]
 
 Floats = NDArray[np.float64]
 
@@ -218,6 +218,12 @@ def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
             raise ParameterError("openings", _shown(given), "faces of the part")
         found |= same
     return [faces[k] for k in sorted(found)]
+
+
+def has_face(part: Part, face: TopoDS_Face) -> bool:
+    """Tell whether a face is one of the part's, or has some of these lying on it."""
+    faces = _faces_of(part.shape)
+    return any(own.IsSame(face) for own in faces) or bool(_lying_on(face, faces))
 
 
 def _lying_on(given: TopoDS_Shape, faces: Sequence[TopoDS_Face]) -> set[int]:

@@ -21,6 +21,7 @@ __all__ = [
     "islands_of",
     "kept_pieces",
     "speck_below",
+    "warn_caller",
     "warn_of_voids",
 ]
 
@@ -65,7 +66,7 @@ class Islands:
             said.append(f"{_counted(self.kept)}, {self.kept_volume:.4g} mm3 in all: left{remedy and f' ({remedy})'}")
         if said:
             text = "not connected to the largest piece: " + "; ".join(said)
-            warnings.warn(text, IslandsWarning, stacklevel=_levels_within())
+            warn_caller(text, IslandsWarning)
 
 
 def island_rule(keep_islands: bool, drop_islands: bool = False) -> IslandRule:
@@ -156,13 +157,13 @@ def warn_of_voids(voids: Sequence[SealedVoid]) -> None:
     if voids:
         counted = "1 void" if len(voids) == 1 else f"{len(voids)} voids"
         text = f"{counted} that no opening reaches, the largest {max(voids, key=lambda void: void.volume)}"
-        warnings.warn(text, SealedVoidsWarning, stacklevel=_levels_within())
+        warn_caller(text, SealedVoidsWarning)
 
 
-def _levels_within() -> int:
-    """Levels of the stack from a warning's own function to the first that is not of this package."""
+def warn_caller(text: str, category: type[Warning]) -> None:
+    """Emit a warning at the line that called this package."""
     package = __name__.partition(".")[0]
-    level, frame = 1, sys._getframe(1)
+    level, frame = 1, sys._getframe(0)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
-    return level
+    warnings.warn(text, category, stacklevel=level)

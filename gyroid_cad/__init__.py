@@ -27,7 +27,6 @@ if TYPE_CHECKING:
         KernelError,
         ParameterError,
         PartWarning,
-        SealedVoidsWarning,
         SelfIntersectionError,
     )
     from gyroid_cad.fields.field import Field
@@ -58,7 +57,6 @@ __all__ = [
     "PartWarning",
     "PrintCheck",
     "Printer",
-    "SealedVoidsWarning",
     "SelfIntersectionError",
     "VolumePatches",
     "__version__",
@@ -77,7 +75,6 @@ _HOMES = {
         "KernelError",
         "ParameterError",
         "PartWarning",
-        "SealedVoidsWarning",
         "SelfIntersectionError",
     ),
     "fields.field": ("Field",),

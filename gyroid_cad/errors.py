@@ -269,7 +269,8 @@ class SealedVoidsWarning(UserWarning):
     --------
     >>> import warnings
     >>> import cadquery as cq
-    >>> from gyroid_cad import FitSettings, SealedVoidsWarning, fill
+    >>> from gyroid_cad import FitSettings, fill
+    >>> from gyroid_cad.errors import SealedVoidsWarning
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore", SealedVoidsWarning)
     ...     filled = fill(cq.Workplane().box(4, 4, 4), 8, density=0.2, skin=0.5, fit=FitSettings(5))

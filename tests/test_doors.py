@@ -385,7 +385,7 @@ def usual() -> dict[str, Made]:
     return {"build": Made(lattice.solid()), "fill": Made(filled.solid())}
 
 
-@pytest.mark.filterwarnings("ignore::gyroid_cad.IslandsWarning", "ignore::gyroid_cad.SealedVoidsWarning")
+@pytest.mark.filterwarnings("ignore::gyroid_cad.IslandsWarning", "ignore::gyroid_cad.errors.SealedVoidsWarning")
 @pytest.mark.parametrize(("table", "option", "door"), REACHED)
 def test_an_option_does_what_it_says(
     table: str, option: str, door: str, usual: dict[str, Made], tmp_path: Path, capsys: Captured

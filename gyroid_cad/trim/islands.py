@@ -148,7 +148,7 @@ def speck_below(cell_size: float) -> float:
 
 
 def warn_of_voids(voids: Sequence[SealedVoid]) -> None:
-    """Emit a :class:`~gyroid_cad.SealedVoidsWarning` at the line that called this package, if there is any void.
+    """Emit a :class:`~gyroid_cad.errors.SealedVoidsWarning` at the line that called this package, if there is any void.
 
     Examples
     --------

@@ -109,6 +109,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     origin: Point = (0.0, 0.0, 0.0),
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
@@ -126,8 +127,8 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin, openings, origin, rotation, fit, drop_islands, keep_islands, tolerance, \
-    lattice, surface, solids
+    cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
+    tolerance, lattice, surface, solids
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -165,6 +166,7 @@ def gyroid_fill(
         drop_islands,
         skin=skin,
         openings=[*openings, *selected],
+        core=core,
         tolerance=tolerance,
         lattice=lattice,
         surface=surface,

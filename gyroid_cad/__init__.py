@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         IslandsWarning,
         KernelError,
         ParameterError,
+        PartWarning,
         SelfIntersectionError,
     )
     from gyroid_cad.fields.field import Field
@@ -53,6 +54,7 @@ __all__ = [
     "LatticeReport",
     "Mesh",
     "ParameterError",
+    "PartWarning",
     "PrintCheck",
     "Printer",
     "SelfIntersectionError",
@@ -72,6 +74,7 @@ _HOMES = {
         "IslandsWarning",
         "KernelError",
         "ParameterError",
+        "PartWarning",
         "SelfIntersectionError",
     ),
     "fields.field": ("Field",),

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
@@ -29,9 +28,12 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
+from gyroid_cad.kernel.check import is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
-from gyroid_cad.kernel.extent import bounding_box, box_round
+from gyroid_cad.kernel.extent import bounding_box
+from gyroid_cad.kernel.repair import fault_of
+from gyroid_cad.mesh.triangles.files import numbered_corners
+from gyroid_cad.mesh.triangles.measures import SignedDistances, unmatched_edges
 from gyroid_cad.trim.box import Box
 
 __all__ = ["Part", "measure", "require_part", "selected_faces"]
@@ -42,15 +44,17 @@ Booleans = NDArray[np.bool_]
 # Of the triangles that distances are measured from, in parts of the largest extent.
 _DEFLECTION = 1e-3
 _ANGULAR_DEFLECTION = 0.5
+# The same of triangles that tell inside from outside: one after the other, until they are closed. The mesher goes
+# beyond its deflection here and there: within so many times it the kernel is asked.
+_INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
 _BOX_FACES, _BOX_CORNERS = 6, 8
-# Of two solids, in parts of the smaller one: less may be rounding, where they touch in a line.
-_SHARED = 1e-6
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+# Without slots, so that its mesh is kept once it is made.
+@dataclass(frozen=True, eq=False)
 class Part:
     """Closed, valid solids.
 
@@ -74,7 +78,21 @@ class Part:
     box: Box | None = None
 
     def contains(self, points: Floats) -> Booleans:
-        """Mask of the points, shape (n, 3), that lie inside (``BRepClass3d_SolidClassifier``); shape (n,)."""
+        """Mask of the points, shape (n, 3), that lie inside; shape (n,).
+
+        A mesh of the part tells, but of points so near to it that it may be on the wrong side of the surface: of these
+        alone the kernel is asked (``BRepClass3d_SolidClassifier``), which takes up to 40 ms for each.
+        """
+        signed, band = self._signed_distances
+        if signed is None:
+            return self._classified(points)
+        distances = signed(points)
+        inside: Booleans = distances < 0
+        near = np.flatnonzero(np.abs(distances) <= band)
+        inside[near] = self._classified(points[near])
+        return inside
+
+    def _classified(self, points: Floats) -> Booleans:
         inside = np.zeros(len(points), dtype=bool)
         for solid in self.solids:
             classifier = BRepClass3d_SolidClassifier(solid)
@@ -82,6 +100,21 @@ class Part:
                 classifier.Perform(gp_Pnt(*points[index].tolist()), _CLASSIFYING_TOLERANCE)
                 inside[index] = classifier.State() == TopAbs_IN
         return inside
+
+    @cached_property
+    def _signed_distances(self) -> tuple[SignedDistances | None, float]:
+        """Distances from a closed mesh, if there is one, and how near to it the surface may run, in mm."""
+        for deflection in _INSIDE_DEFLECTIONS * float(np.max(self.high - self.low)):
+            corners = np.concatenate([np.stack(some, axis=1) for some in self._meshed(float(deflection))])
+            vertices, triangles, _ = numbered_corners(corners)
+            if not unmatched_edges(triangles):
+                return SignedDistances(vertices, triangles), _BAND * float(deflection)
+        return None, 0.0
+
+    def _meshed(self, deflection: float) -> Iterator[tuple[Floats, Floats, Floats]]:
+        copy = BRepBuilderAPI_Copy(self.shape, False, False).Shape()
+        BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, True)
+        return _triangles(copy)
 
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
@@ -99,15 +132,13 @@ class Part:
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
-        copy = BRepBuilderAPI_Copy(self.shape, False, False).Shape()
-        BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
-        clouds = [_spread(*triangles, spacing) for triangles in _triangles(copy)]
+        clouds = [_spread(*triangles, spacing) for triangles in self._meshed(deflection)]
         points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
         return points, normals, spacing + deflection
 
 
 def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
-    """The solids of a shape, if they are closed, valid and the right way out.
+    """The solids of a shape, which have no space in common, if they are closed, valid and the right way out.
 
     Raises
     ------
@@ -120,37 +151,14 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
     if not solids:
         raise ParameterError(parameter, kind, "a closed solid: there is none in it")
-    volumes = []
     for index, solid in enumerate(solids, 1):
-        which = "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"
-        if open_edges := topology(solid).open_edges:
-            raise ParameterError(parameter, kind, f"a closed solid: {which} has {open_edges} open edges")
-        if not is_valid(solid):
-            raise ParameterError(parameter, kind, f"a valid solid: the kernel finds fault with {which}")
-        volumes.append(measure(solid)[0])
-        if not volumes[-1] > 0:
-            raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
-    _require_apart(solids, parameter, kind)
+        if fault := fault_of(solid, "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"):
+            raise ParameterError(parameter, kind, fault)
     low, high = bounding_box(shape)
+    volume = sum(measure(solid)[0] for solid in solids)
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, low, high, sum(volumes), _box_of(solids))
-
-
-def _require_apart(solids: Sequence[TopoDS_Solid], parameter: str, kind: str) -> None:
-    """Refuse solids that have space or faces in common: the boundary of what they take up is then none of theirs."""
-    boxes = [box_round([solid]) for solid in solids]
-    for first, second in combinations(range(len(solids)), 2):
-        if boxes[first].IsOut(boxes[second]):
-            continue
-        pair = [solids[first], solids[second]]
-        common = measure(BRepAlgoAPI_Common(*pair).Shape())[0]
-        touching = measure(BRepAlgoAPI_Common(*(compound_of(parts_of(one, TopAbs_FACE)) for one in pair)).Shape())[1]
-        volume, area = (min(sizes) for sizes in zip(*map(measure, pair), strict=True))
-        amount = f"{common:.4g} mm3" if common > _SHARED * volume else f"{touching:.4g} mm2 of their faces"
-        if common > _SHARED * volume or touching > _SHARED * area:
-            which = f"solids {first + 1} and {second + 1} of {len(solids)} have {amount} in common"
-            raise ParameterError(parameter, kind, f"solids that neither overlap nor touch: {which}; fuse them first")
+    return Part(divided, solids, low, high, volume, _box_of(solids))
 
 
 def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
@@ -188,22 +196,6 @@ def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
     divide.Perform()
     divided = divide.Result()
     return shape if divided is None or divided.IsNull() or not is_valid(divided) else divided
-
-
-# Relative, as the kernel estimates it: far above what it comes to.
-_MEASURE = 1e-4
-
-
-def measure(shape: TopoDS_Shape) -> tuple[float, float]:
-    """Volume in mm3 and surface area in mm2 (``BRepGProp``), either off by some 1e-7 of it.
-
-    Integrated adaptively: the kernel's rule of a fixed order is off by up to 6e-5 on a lattice's faces, and takes three
-    to eight times as long.
-    """
-    volume, area = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, volume, _MEASURE)
-    BRepGProp.SurfaceProperties_s(shape, area, _MEASURE)
-    return float(volume.Mass()), float(area.Mass())
 
 
 def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:

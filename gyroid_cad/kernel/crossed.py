@@ -11,20 +11,23 @@ from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.gp import gp_Pnt, gp_Pnt2d
-from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
+from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Vertex, TopoDS_Wire
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.kernel.boundary import ReadBoundary
-from gyroid_cad.kernel.compat import Point2dArray, as_edge, as_face
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, Point2dArray, as_edge, as_face
+from gyroid_cad.kernel.part import measure_about
 from gyroid_cad.kernel.split import Change, Pieces
 from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops, Uses
+from gyroid_cad.trim.measures import Measures
 from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["crossed_pieces"]
+__all__ = ["crossed_pieces", "sizes_of"]
 
 Floats = NDArray[np.float64]
 
@@ -250,3 +253,37 @@ class _Realisation:
             (self.read.edges[edge], tuple(self.edges[number] for _, number in sorted(pieces)))
             for edge, pieces in self.pieces_of.items()
         )
+
+
+def sizes_of(
+    solids: Iterable[TopoDS_Shape], faces: Iterable[TopoDS_Face], measures: Measures, middle: Floats
+) -> list[tuple[float, float]]:
+    """Volumes in mm3 and areas in mm2 of solids, from those of their faces; the kernel is asked for faces not given.
+
+    Parameters
+    ----------
+    solids : iterable of TopoDS_Shape
+    faces : iterable of TopoDS_Face
+        Oriented as they are measured.
+    measures : Measures
+        Of the faces, in that order.
+    middle : ndarray, shape (3,)
+        That the fluxes are taken about.
+    """
+    numbers, orientations = NumberedShapes(), []
+    for face in faces:
+        numbers.Add(face)
+        orientations.append(face.Orientation())
+    sizes = []
+    for solid in solids:
+        volume = area = 0.0
+        for face in parts_of(solid, TopAbs_FACE):
+            index = int(numbers.FindIndex(face)) - 1
+            if index >= 0:
+                sign = 1.0 if face.Orientation() == orientations[index] else -1.0
+                flux, size = sign * float(measures.flux[index]), float(measures.area[index])
+            else:
+                flux, size = measure_about(face, middle)
+            volume, area = volume + flux, area + size
+        sizes.append((volume, area))
+    return sizes

@@ -52,6 +52,15 @@ class Surface(Protocol):
         """Points (n, 3) at parameters (n, 2)."""
         ...
 
+    def area_vectors(self, places: Floats) -> Floats:
+        """Cross products of the derivatives by s and t, (n, 3), at parameters (n, 2)."""
+        ...
+
+    @property
+    def gauss(self) -> tuple[int, int]:
+        """Equal pieces along t, and Gauss points in each, that integrate fluxes and areas."""
+        ...
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadric:
@@ -114,6 +123,29 @@ class Quadric:
             own = np.stack([along * np.cos(s), along * np.sin(s), z], axis=-1)
         return np.asarray(self.origin + own @ self.axes)
 
+    def area_vectors(self, places: Floats) -> Floats:
+        """As of :class:`Surface`."""
+        s, t = places.T
+        cosine, sine, one = np.cos(s), np.sin(s), np.ones_like(s)
+        if self.kind == "plane":
+            own = np.stack([0 * one, 0 * one, one], axis=-1)
+        elif self.kind == "cylinder":
+            own = self.radius * np.stack([cosine, sine, 0 * one], axis=-1)
+        elif self.kind == "cone":
+            flat, steep = np.cos(self.second), np.sin(self.second)
+            along = (self.radius + t * steep)[:, np.newaxis]
+            own = along * np.stack([flat * cosine, flat * sine, -steep * one], axis=-1)
+        else:
+            minor = self.radius if self.kind == "sphere" else self.second
+            outwards = np.stack([np.cos(t) * cosine, np.cos(t) * sine, np.sin(t)], axis=-1)
+            own = minor * self._profile(t)[0][:, np.newaxis] * outwards
+        return np.asarray(self._handed * own @ self.axes)
+
+    @property
+    def gauss(self) -> tuple[int, int]:
+        """As of :class:`Surface`."""
+        return {"plane": (1, 1), "cylinder": (1, 2), "cone": (1, 3), "sphere": (1, 9), "torus": (2, 9)}[self.kind]
+
     @property
     def _handed(self) -> float:
         """-1 if the axes are left-handed: then the normal of the parameters points inwards."""
@@ -175,6 +207,16 @@ class FreeForm:
     def points(self, places: Floats) -> Floats:
         """As of :class:`Surface`."""
         return self.derivatives(*places.T)[0]
+
+    def area_vectors(self, places: Floats) -> Floats:
+        """As of :class:`Surface`."""
+        _, ds, dt, *_ = self.derivatives(*places.T)
+        return np.cross(ds, dt)
+
+    @property
+    def gauss(self) -> tuple[int, int]:
+        """As of :class:`Surface`."""
+        return 4, 6
 
     @cached_property
     def _samples(self) -> tuple[Floats, Floats, Floats, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,22 +17,27 @@ from OCP.GeomAbs import (
     GeomAbs_Circle,
     GeomAbs_Cone,
     GeomAbs_Cylinder,
+    GeomAbs_Ellipse,
     GeomAbs_Line,
     GeomAbs_Plane,
     GeomAbs_Sphere,
+    GeomAbs_SurfaceOfExtrusion,
+    GeomAbs_SurfaceOfRevolution,
     GeomAbs_Torus,
 )
+from OCP.Geom import Geom_BSplineSurface
 from OCP.gp import gp_Ax3, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 
+from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex, as_wire
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
-from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.nurbs.basis import basis, quotients
 from gyroid_cad.nurbs.surface import point_derivatives
 from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
 from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface
@@ -39,7 +45,9 @@ from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface
 __all__ = ["ReadBoundary", "read_boundary"]
 
 Floats = NDArray[np.float64]
-Curve = Callable[[Floats], tuple[Floats, Floats]]
+# From parameters (n,) to points and derivatives; from two of them to points and derivatives by s, t, ss, st and tt.
+Curve = Callable[[Floats], tuple[Floats, ...]]
+Derivatives = Callable[[Floats, Floats], tuple[Floats, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,20 +159,17 @@ def _placed(position: gp_Ax3) -> tuple[Floats, Floats]:
     return np.array(_values(position.Location())), np.array([_values(direction) for direction in directions])
 
 
-def _derivatives(adaptor: BRepAdaptor_Surface) -> Callable[[Floats, Floats], tuple[Floats, ...]]:
-    if adaptor.GetType() == GeomAbs_BSplineSurface:
-        spline = adaptor.BSpline()
-        if not (spline.IsUPeriodic() or spline.IsVPeriodic()):
-            surface = nurbs_of_surface(spline)
-            degrees = (spline.UDegree(), spline.VDegree())
-            if all(np.ptp(k[: d + 1]) == 0 and np.ptp(k[-d - 1 :]) == 0 for k, d in zip(
-                    (surface.knots_u, surface.knots_v), degrees, strict=True)):
-                given = surface.control_points[np.newaxis], surface.weights, (surface.knots_u, surface.knots_v)
-
-                def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
-                    return tuple(some[0] for some in point_derivatives(*given, s[np.newaxis], t[np.newaxis], 2))
-
-                return found
+def _derivatives(adaptor: BRepAdaptor_Surface) -> Derivatives:
+    """Points and derivatives by s, t, ss, st and tt of a surface that is none of the simple ones."""
+    kind = adaptor.GetType()
+    if kind == GeomAbs_BSplineSurface and (known := _of_spline(adaptor.BSpline())) is not None:
+        return known
+    if kind == GeomAbs_SurfaceOfRevolution:
+        axis = adaptor.AxeOfRevolution()
+        at, along = np.array(_values(axis.Location())), np.array(_values(axis.Direction()))
+        return _of_revolution(at, along, _curve_in_space(adaptor.BasisCurve(), 2))
+    if kind == GeomAbs_SurfaceOfExtrusion:
+        return _of_extrusion(np.array(_values(adaptor.Direction())), _curve_in_space(adaptor.BasisCurve(), 2))
 
     def asked(s: Floats, t: Floats) -> tuple[Floats, ...]:
         made = np.empty((6, len(s), 3))
@@ -173,35 +178,79 @@ def _derivatives(adaptor: BRepAdaptor_Surface) -> Callable[[Floats, Floats], tup
         for index, (u, v) in enumerate(zip(s.tolist(), t.tolist(), strict=True)):
             adaptor.D2(u, v, point, ds, dt, dss, dtt, dst)
             for row, value in enumerate((point, ds, dt, dss, dst, dtt)):
-                made[row, index] = value.X(), value.Y(), value.Z()
+                made[row, index] = _values(value)
         return tuple(made)
 
     return asked
 
 
-def _curve_in_space(adaptor: BRepAdaptor_Curve) -> Curve:
+def _of_spline(spline: Geom_BSplineSurface) -> Derivatives | None:
+    if spline.IsUPeriodic() or spline.IsVPeriodic():
+        return None
+    surface = nurbs_of_surface(spline)
+    degrees, knots = (spline.UDegree(), spline.VDegree()), (surface.knots_u, surface.knots_v)
+    if any(np.ptp(k[: d + 1]) or np.ptp(k[-d - 1 :]) for k, d in zip(knots, degrees, strict=True)):
+        return None
+    given = surface.control_points[np.newaxis], surface.weights, knots
+
+    def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
+        return tuple(some[0] for some in point_derivatives(*given, s[np.newaxis], t[np.newaxis], 2))
+
+    return found
+
+
+def _of_revolution(origin: Floats, axis: Floats, curve: Curve) -> Derivatives:
+    def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
+        cosine, sine = np.cos(s)[:, np.newaxis], np.sin(s)[:, np.newaxis]
+
+        def turned(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+            """Vectors turned about the axis (Rodrigues), and the first two derivatives of that by the angle."""
+            along = dot(vectors, axis)[:, np.newaxis] * axis
+            out, across = vectors - along, np.cross(axis, vectors)
+            radial = cosine * out + sine * across
+            return along + radial, cosine * across - sine * out, -radial
+
+        point, rate, bend = curve(t)
+        (x, ds, dss), (dt, dst, _), (dtt, _, _) = turned(point - origin), turned(rate), turned(bend)
+        return origin + x, ds, dt, dss, dst, dtt
+
+    return found
+
+
+def _of_extrusion(direction: Floats, curve: Curve) -> Derivatives:
+    def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
+        point, rate, bend = curve(s)
+        none = np.zeros_like(point)
+        return point + t[:, np.newaxis] * direction, rate, none + direction, bend, none, none
+
+    return found
+
+
+def _curve_in_space(adaptor: Any, order: int = 1) -> Curve:
     kind = adaptor.GetType()
     if kind == GeomAbs_Line:
         line = adaptor.Line()
         return _line(np.array(_values(line.Location())), np.array(_values(line.Direction())))
-    if kind == GeomAbs_Circle:
-        circle = adaptor.Circle()
-        position = circle.Position()
-        axes = [np.array(_values(axis)) for axis in (position.XDirection(), position.YDirection())]
-        return _circle(np.array(_values(position.Location())), *axes, circle.Radius())
-    if kind == GeomAbs_BSplineCurve:
+    if kind in (GeomAbs_Circle, GeomAbs_Ellipse):
+        conic = adaptor.Circle() if kind == GeomAbs_Circle else adaptor.Ellipse()
+        radii = (conic.Radius(),) * 2 if kind == GeomAbs_Circle else (conic.MajorRadius(), conic.MinorRadius())
+        position = conic.Position()
+        axes = [
+            radius * np.array(_values(axis))
+            for radius, axis in zip(radii, (position.XDirection(), position.YDirection()), strict=True)
+        ]
+        return _ellipse(np.array(_values(position.Location())), *axes)
+    if kind == GeomAbs_BSplineCurve and not adaptor.BSpline().IsPeriodic():
         spline = adaptor.BSpline()
-        if not spline.IsPeriodic():
-            poles = np.array([_values(spline.Pole(k)) for k in range(1, spline.NbPoles() + 1)])
-            return _spline(spline, poles)
+        return _spline(spline, np.array([_values(spline.Pole(k)) for k in range(1, spline.NbPoles() + 1)]), order)
 
-    def asked(t: Floats) -> tuple[Floats, Floats]:
-        point, along = gp_Pnt(), gp_Vec()
-        made = np.empty((2, len(t), 3))
+    def asked(t: Floats) -> tuple[Floats, ...]:
+        found = gp_Pnt(), gp_Vec(), gp_Vec()
+        made = np.empty((3, len(t), 3))
         for index, place in enumerate(t.tolist()):
-            adaptor.D1(place, point, along)
-            made[:, index] = _values(point), _values(along)
-        return made[0], made[1]
+            adaptor.D2(place, *found)
+            made[:, index] = [_values(some) for some in found]
+        return tuple(made[: order + 1])
 
     return asked
 
@@ -212,53 +261,56 @@ def _curve_on_surface(adaptor: BRepAdaptor_Curve2d) -> Curve:
         line = adaptor.Line()
         origin, along = line.Location(), line.Direction()
         return _line(np.array([origin.X(), origin.Y()]), np.array([along.X(), along.Y()]))
-    if kind == GeomAbs_BSplineCurve:
+    if kind == GeomAbs_BSplineCurve and not adaptor.BSpline().IsPeriodic():
         spline = adaptor.BSpline()
-        if not spline.IsPeriodic():
-            poles = [spline.Pole(k) for k in range(1, spline.NbPoles() + 1)]
-            return _spline(spline, np.array([(pole.X(), pole.Y()) for pole in poles]))
+        poles = [spline.Pole(k) for k in range(1, spline.NbPoles() + 1)]
+        return _spline(spline, np.array([(pole.X(), pole.Y()) for pole in poles]), 1)
 
-    def asked(t: Floats) -> tuple[Floats, Floats]:
+    def asked(t: Floats) -> tuple[Floats, ...]:
         point, along = gp_Pnt2d(), gp_Vec2d()
         made = np.empty((2, len(t), 2))
         for index, place in enumerate(t.tolist()):
             adaptor.D1(place, point, along)
             made[:, index] = (point.X(), point.Y()), (along.X(), along.Y())
-        return made[0], made[1]
+        return tuple(made)
 
     return asked
 
 
 def _line(origin: Floats, direction: Floats) -> Curve:
-    return lambda t: (origin + t[:, np.newaxis] * direction, np.broadcast_to(direction, (len(t), len(direction))))
-
-
-def _circle(centre: Floats, x: Floats, y: Floats, radius: float) -> Curve:
-    def found(t: Floats) -> tuple[Floats, Floats]:
-        cosine, sine = np.cos(t)[:, np.newaxis], np.sin(t)[:, np.newaxis]
-        return centre + radius * (cosine * x + sine * y), radius * (cosine * y - sine * x)
+    def found(t: Floats) -> tuple[Floats, ...]:
+        along = np.broadcast_to(direction, (len(t), len(direction)))
+        return origin + t[:, np.newaxis] * direction, along, np.zeros_like(along)
 
     return found
 
 
-def _spline(spline: object, poles: Floats) -> Curve:
+def _ellipse(centre: Floats, x: Floats, y: Floats) -> Curve:
+    def found(t: Floats) -> tuple[Floats, ...]:
+        cosine, sine = np.cos(t)[:, np.newaxis], np.sin(t)[:, np.newaxis]
+        radial = cosine * x + sine * y
+        return centre + radial, cosine * y - sine * x, -radial
+
+    return found
+
+
+def _spline(spline: Any, poles: Floats, order: int) -> Curve:
     """A B-spline curve of the kernel's, in space or in the plane, by its own basis."""
-    count = spline.NbKnots()  # type: ignore[attr-defined]
+    count = spline.NbKnots()
     knots = np.repeat(
-        [spline.Knot(k) for k in range(1, count + 1)],  # type: ignore[attr-defined]
-        [spline.Multiplicity(k) for k in range(1, count + 1)],  # type: ignore[attr-defined]
+        [spline.Knot(k) for k in range(1, count + 1)], [spline.Multiplicity(k) for k in range(1, count + 1)]
     )
-    degree = int(spline.Degree())  # type: ignore[attr-defined]
-    weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])  # type: ignore[attr-defined]
+    degree = int(spline.Degree())
+    weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])
     weighted = np.concatenate([poles * weights[:, np.newaxis], weights[:, np.newaxis]], axis=1)
 
-    def found(t: Floats) -> tuple[Floats, Floats]:
-        value, rate = (basis(knots, degree, t, k) @ weighted for k in (0, 1))
-        points = value[:, :-1] / value[:, -1:]
-        return points, (rate[:, :-1] - points * rate[:, -1:]) / value[:, -1:]
+    def found(t: Floats) -> tuple[Floats, ...]:
+        sums = [basis(knots, degree, t, k) @ weighted for k in range(order + 1)]
+        values = {(k,): some[:, :-1] for k, some in enumerate(sums)}
+        return tuple(quotients(values, {(k,): some[:, -1:] for k, some in enumerate(sums)}).values())
 
     return found
 
 
-def _values(point: object) -> tuple[float, float, float]:
-    return point.X(), point.Y(), point.Z()  # type: ignore[attr-defined]
+def _values(point: Any) -> tuple[float, float, float]:
+    return point.X(), point.Y(), point.Z()

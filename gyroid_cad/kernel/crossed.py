@@ -16,9 +16,8 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.kernel.boundary import ReadBoundary
-from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.check import measure_about, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, Point2dArray, as_edge, as_face
-from gyroid_cad.kernel.part import measure_about
 from gyroid_cad.kernel.split import Change, Pieces
 from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
 from gyroid_cad.nurbs.surface import NurbsCurve

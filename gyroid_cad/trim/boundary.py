@@ -17,8 +17,8 @@ __all__ = ["Boundary", "BoundaryEdge", "BoundaryFace", "Coedge"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
-# From parameters (n,) to points and derivatives, each of shape (n, 2) or (n, 3).
-Curve = Callable[[Floats], tuple[Floats, Floats]]
+# From parameters (n,) to points and derivatives, the first one at least, each of shape (n, 2) or (n, 3).
+Curve = Callable[[Floats], tuple[Floats, ...]]
 
 # Sags of polygons along a border, in parts of the face's own extent: rough ones, and those for places near them.
 _SAGS = (1e-3, 1e-7)

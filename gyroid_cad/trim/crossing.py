@@ -20,7 +20,7 @@ from gyroid_cad.trim.boundary import Boundary, BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, pairs_of
 from gyroid_cad.trim.loops import linked, nested
-from gyroid_cad.trim.nodes import PartNodes, RimNodes, part_nodes, rim_nodes
+from gyroid_cad.trim.nodes import part_nodes, rim_nodes
 from gyroid_cad.trim.paths import Ends, Paths, closed_paths, open_paths
 from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
 from gyroid_cad.trim.sections import section_knots

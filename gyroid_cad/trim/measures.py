@@ -16,7 +16,7 @@ from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Measures", "boundary_measures", "lattice_measures", "whole_measures"]
+__all__ = ["Measures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -38,6 +38,11 @@ class Measures:
 
     flux: Floats
     area: Floats
+
+
+def joined(*measures: Measures) -> Measures:
+    """Measures of several sets of pieces, one after the other."""
+    return Measures(*(np.concatenate([getattr(some, name) for some in measures]) for name in ("flux", "area")))
 
 
 def whole_measures(wall: Wall, whole: list[tuple[int, int, bool]], middle: Floats) -> Measures:
@@ -119,7 +124,7 @@ def _part_piece(cut: Crossing, piece: CutLoops, middle: Floats) -> tuple[float, 
         else:
             coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == forward)
             t, weights = gauss_points(np.linspace(edge.first, edge.last, _PART_PIECES + 1), _PER_STRETCH)
-            place, rate = coedge.curve(t)
+            place, rate, *_ = coedge.curve(t)
         places.append(place)
         rates.append(weights * rate[:, 0] * (1 if forward else -1))
     flux, area = _integrals(face, np.concatenate(places), middle)

@@ -191,7 +191,7 @@ def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats
     for number, one in enumerate(boundary.edges):
         if one.curve is None:
             continue
-        points, rates = one.curve(np.linspace(one.first, one.last, 33))
+        points, rates, *_ = one.curve(np.linspace(one.first, one.last, 33))
         length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
         along = rates / np.maximum(np.linalg.norm(rates, axis=1, keepdims=True), np.finfo(float).tiny)
         turn = np.linalg.norm(np.diff(along, axis=0), axis=1).sum()
@@ -273,7 +273,7 @@ def _converged(
         assert curve is not None
         span = boundary.edges[number].last - boundary.edges[number].first
         for step in range(_NEWTON_STEPS + 1):
-            place, rate = curve(unknown[rows, 0])
+            place, rate, *_ = curve(unknown[rows, 0])
             point, du, dv = (some[:, 0] for some in faces.derivatives(face[rows], *unknown[rows, 1:, None].transpose(1, 0, 2)))
             normal = np.cross(du, dv)
             left[rows], points[rows] = place - point, point

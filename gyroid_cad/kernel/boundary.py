@@ -40,7 +40,7 @@ from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.basis import basis, quotients
 from gyroid_cad.nurbs.surface import point_derivatives
 from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
-from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface
+from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface, Swept
 
 __all__ = ["ReadBoundary", "read_boundary"]
 
@@ -150,8 +150,16 @@ def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
     if kind == GeomAbs_Torus:
         torus = adaptor.Torus()
         return Quadric("torus", *_placed(torus.Position()), torus.MajorRadius(), torus.MinorRadius())
-    low, high = face.range
-    return FreeForm(_derivatives(adaptor), low, high)
+    free = FreeForm(_derivatives(adaptor), *face.range)
+    if kind == GeomAbs_SurfaceOfExtrusion:
+        direction = np.array(_values(adaptor.Direction()))
+        return Swept(free, np.zeros(3), direction, _curve_in_space(adaptor.BasisCurve(), 2), False)
+    if kind == GeomAbs_SurfaceOfRevolution:
+        axis = adaptor.AxeOfRevolution()
+        at, along = np.array(_values(axis.Location())), np.array(_values(axis.Direction()))
+        swept = Swept(free, at, along, _curve_in_space(adaptor.BasisCurve(), 2), True)
+        return swept if swept.planar else free
+    return free
 
 
 def _placed(position: gp_Ax3) -> tuple[Floats, Floats]:
@@ -303,6 +311,9 @@ def _spline(spline: Any, poles: Floats, order: int) -> Curve:
     degree = int(spline.Degree())
     weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])
     weighted = np.concatenate([poles * weights[:, np.newaxis], weights[:, np.newaxis]], axis=1)
+
+    if np.ptp(weights) == 0:
+        return lambda t: tuple(basis(knots, degree, t, k) @ poles for k in range(order + 1))
 
     def found(t: Floats) -> tuple[Floats, ...]:
         sums = [basis(knots, degree, t, k) @ weighted for k in range(order + 1)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +12,10 @@ from gyroid_cad.common.arrays import dot
 from gyroid_cad.nurbs.basis import basis, gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
-from gyroid_cad.trim.crossing import Crossing, CutLoops
+from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.sections import section_knots
+from gyroid_cad.trim.surfaces import Quadric
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["Measures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
@@ -22,6 +24,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 16
+# Of a face of the part that is no plane, along each parameter.
+_SPANS = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,68 +90,106 @@ def _in_order(found: list[tuple[int, float]]) -> Floats:
     return np.array([value for _, value in sorted(found)])
 
 
+Stretch = tuple[Floats, Floats, Floats, Floats]
+
+
 def _square_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
-    """Places along a piece's border, and weights times the rate of v; the sides where that or the integral is 0 left."""
-    places, rates = [np.zeros((0, 2))], [np.zeros(0)]
+    """Places along a piece's border in the square, and weights times the rate of v."""
     complex, patch = cut.faces.wall.complex, int(cut.faces.patch[piece.face])
-    for number, forward in (use for loop in piece.loops for use in loop):
-        edge = cut.edges[number]
+    sides = complex.patch_edges[patch].tolist()
+
+    def stretch(edge: CutEdge, forward: bool) -> Stretch:
         if edge.kind == "section":
-            place, rate, weights = _along(cut.sections[edge.number].in_square, edge.first, edge.last)
-            rate = rate[:, 1]
-        else:
-            side = complex.patch_edges[patch].tolist().index(edge.number % complex.edge_count)
-            if side != 1:
-                continue
-            t, weights = gauss_points(np.linspace(edge.first, edge.last, _RIM_PIECES + 1), _PER_STRETCH)
-            runs_on = bool(complex.edge_forward[patch, side])
-            place = np.stack(square_points(side, t if runs_on else -t), axis=-1)
-            rate = np.full(len(t), 1.0 if runs_on else -1.0)
-        places.append(place)
-        rates.append(weights * rate * (1 if forward else -1))
+            return _along(cut.sections[edge.number].in_square, edge.first, edge.last)
+        side = sides.index(edge.number % complex.edge_count)
+        sign = 1.0 if complex.edge_forward[patch, side] else -1.0
+        # Of the other sides either the integral or the rate is 0.
+        pieces = _RIM_PIECES if side == 1 else 1
+        t, weights = gauss_points(np.linspace(edge.first, edge.last, pieces + 1), _PER_STRETCH)
+        places = np.stack(square_points(side, sign * t), axis=-1)
+        ends = np.stack(square_points(side, sign * np.array([edge.first, edge.last])), axis=-1)
+        rate = (0.0, 1.0, 0.0, -1.0)[side] * sign
+        return places, np.full(len(t), rate), weights, ends
+
+    return _border(cut, piece, stretch)
+
+
+def _border(
+    cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], Stretch]
+) -> tuple[Floats, Floats]:
+    """Places along a piece's border, and weights times the rate of the second parameter.
+
+    Where two stretches meet, what is between their ends is part of the border too: an edge of the part need not quite
+    lie on its faces, and an integral from the far side would make much of that.
+    """
+    places, rates = [np.zeros((0, 2))], [np.zeros(0)]
+    for loop in piece.loops:
+        ends = []
+        for number, forward in loop:
+            place, rate, weights, both = stretch(cut.edges[number], forward)
+            places.append(place)
+            rates.append(weights * rate * (1 if forward else -1))
+            ends.append(both if forward else both[::-1])
+        starts, stops = np.array([both[0] for both in ends]), np.array([both[1] for both in ends])
+        following = np.roll(starts, -1, axis=0)
+        places.append((stops + following) / 2)
+        rates.append((following - stops)[:, 1])
     return np.concatenate(places), np.concatenate(rates)
 
 
 def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> Measures:
     """Measure pieces of the part's faces."""
-    found = [_part_piece(cut, piece, middle) for piece in pieces]
-    return Measures(np.array([flux for flux, _ in found]), np.array([area for _, area in found]))
+    flux, area = [], []
+    samples: tuple[int, _Samples] | None = None
+    for index in sorted(range(len(pieces)), key=lambda k: pieces[k].face):
+        face = cut.boundary.faces[pieces[index].face]
+        if samples is None or samples[0] != pieces[index].face:
+            samples = pieces[index].face, _Samples(face, middle)
+        places, rates = _part_border(cut, pieces[index])
+        total = samples[1].over(places, rates)
+        flux.append((index, face.sign * float(total[0])))
+        area.append((index, float(total[1])))
+    return Measures(_in_order(flux), _in_order(area))
 
 
-def _part_piece(cut: Crossing, piece: CutLoops, middle: Floats) -> tuple[float, float]:
+class _Samples:
+    """Densities of flux and area of a face of the part, sampled on a square in place of its parameters."""
+
+    def __init__(self, face: BoundaryFace, middle: Floats) -> None:
+        self.low, high = face.range
+        self.scale = (high - self.low) / 2
+        spans = 1 if isinstance(face.surface, Quadric) and face.surface.kind == "plane" else _SPANS
+        self.quadrature = SquareQuadrature(np.linspace(-1, 1, spans + 1))
+        nodes = self.quadrature.places
+        grid = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
+        places = self.low + self.scale * (grid + 1)
+        vectors, points = face.surface.area_vectors(places), face.surface.points(places)
+        flux, area = dot(points - middle, vectors) / 3, np.linalg.norm(vectors, axis=1)
+        self.density = np.stack([flux, area], axis=-1).reshape(len(nodes), len(nodes), 2) * np.prod(self.scale)
+
+    def over(self, places: Floats, rates: Floats) -> Floats:
+        square = np.clip((places - self.low) / self.scale - 1, -1, 1)
+        return self.quadrature.over(square, rates / self.scale[1], self.density)
+
+
+def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
+    """Places along a piece's border on its face of the part, and weights times the rate of t."""
     face = cut.boundary.faces[piece.face]
-    places, rates = [np.zeros((0, 2))], [np.zeros(0)]
-    for number, forward in (use for loop in piece.loops for use in loop):
-        edge = cut.edges[number]
+
+    def stretch(edge: CutEdge, forward: bool) -> Stretch:
         if edge.kind == "section":
-            place, rate, weights = _along(cut.sections[edge.number].on_part, edge.first, edge.last)
-        else:
-            coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == forward)
-            t, weights = gauss_points(np.linspace(edge.first, edge.last, _PART_PIECES + 1), _PER_STRETCH)
-            place, rate, *_ = coedge.curve(t)
-        places.append(place)
-        rates.append(weights * rate[:, 0] * (1 if forward else -1))
-    flux, area = _integrals(face, np.concatenate(places), middle)
-    # The area is on the left of the border: of an antiderivative along t, less its integral along s.
-    along = np.concatenate(rates)
-    return -face.sign * float(along @ flux), -float(along @ area)
+            return _along(cut.sections[edge.number].on_part, edge.first, edge.last)
+        coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == forward)
+        t, weights = gauss_points(np.linspace(edge.first, edge.last, _PART_PIECES + 1), _PER_STRETCH)
+        places, rates, *_ = coedge.curve(np.concatenate([t, [edge.first, edge.last]]))
+        return places[:-2], rates[:-2, 1], weights, places[-2:]
+
+    return _border(cut, piece, stretch)
 
 
-def _integrals(face: BoundaryFace, places: Floats, middle: Floats) -> tuple[Floats, Floats]:
-    """Integrals of the densities of flux and area along t, from the face's least t to each place."""
-    pieces, count = face.surface.gauss
-    nodes, weights = gauss_points(np.linspace(0, 1, pieces + 1), count)
-    low = face.range[0][1]
-    reach = places[:, 1] - low
-    t = low + reach[:, None] * nodes
-    asked = np.stack([np.repeat(places[:, 0], len(nodes)), t.ravel()], axis=-1)
-    vectors, points = face.surface.area_vectors(asked), face.surface.points(asked)
-    flux = dot(points - middle, vectors).reshape(t.shape) / 3
-    return reach * (flux @ weights), reach * (np.linalg.norm(vectors, axis=1).reshape(t.shape) @ weights)
-
-
-def _along(control: Floats, first: float, last: float) -> tuple[Floats, Floats, Floats]:
-    """Places and rates of a section curve at Gauss points between its stations, and their weights."""
+def _along(control: Floats, first: float, last: float) -> Stretch:
+    """Places and rates of a section curve at Gauss points between its stations, their weights, and its ends."""
     knots = section_knots(len(control))
     t, weights = gauss_points(np.linspace(first, last, len(control)), _PER_STRETCH)
-    return basis(knots, 3, t) @ control, basis(knots, 3, t, 1) @ control, weights
+    rates = basis(knots, 3, t, 1) @ control[:, 1]
+    return basis(knots, 3, t) @ control, rates, weights, control[[0, -1]]

@@ -26,6 +26,8 @@ Booleans = NDArray[np.bool_]
 
 # Samples along a rim, as close as those of planes.
 _RIM_SAMPLES = 65
+# A side is first looked at in so many places, to see whether it comes near at all.
+_LOOKED_AT = 9
 # The sine of an angle at which an edge touches a face, and how near a corner a node may be, in parts of the edge.
 _TOUCHING, _AT_CORNER = 1e-6, 1e-6
 # Triangles along each side of a face, by which edges of the part are first looked for; how far beyond a triangle and a
@@ -108,6 +110,8 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     index = np.searchsorted(flat, rims)
     both = np.stack([np.repeat(index[pairs.face], 1, axis=0).ravel(), np.repeat(pairs.part, 4)], axis=1)
     rim, part = np.unique(both, axis=0).T
+    near = _may_cross(pairs, owner[rim], owned_side[rim], part)
+    rim, part = rim[near], part[near]
     step = 2 / (_RIM_SAMPLES - 1)
     samples = np.linspace(-1 - step, 1 + step, _RIM_SAMPLES + 2)
     asked = Pairs(pairs.faces, pairs.boundary, owner[rim], part)
@@ -136,6 +140,17 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     order = np.lexsort((along, rim[which]))
     which = which[order]
     return RimNodes(flat[rim[which]], part[which], along[order], inwards[order], places[order], points[order])
+
+
+def _may_cross(pairs: Pairs, face: Integers, side: Integers, part: Integers) -> Booleans:
+    """Mask of the sides that come as near a face of the part as they reach between a few places."""
+    points = pairs.faces.along_sides(face, side, np.linspace(-1, 1, _LOOKED_AT))
+    reach = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
+    near = np.empty(len(face), dtype=bool)
+    for number, rows in grouped(part):
+        found, error = pairs.boundary.faces[number].surface.roughly(points[rows].reshape(-1, 3))
+        near[rows] = np.min((np.abs(found) - error).reshape(len(rows), -1), axis=1) <= reach[rows]
+    return near
 
 
 def _rough_heights(pairs: Pairs, side: Integers, samples: Floats, size: float) -> Floats:

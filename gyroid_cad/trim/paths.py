@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.lattice_faces import GRID, Pairs
+from gyroid_cad.trim.lattice_faces import GRID, Pairs, grouped
 
 __all__ = ["Ends", "Paths", "closed_paths", "open_paths"]
 
@@ -30,6 +30,8 @@ _TURN = 0.35
 # Of a step: so far aside of it a node may lie to end there, and so far Newton's method may move its end.
 _ASIDE, _ASTRAY = 0.08, 0.25
 _OUT = 1.1
+# Steps of the grid between places that are looked at first.
+_COARSE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -258,11 +260,30 @@ def _unexplained(pairs: Pairs, known: Paths) -> tuple[Integers, Floats]:
 
 
 def _above(pairs: Pairs, rows: Integers, points: Floats, which: Integers) -> Booleans:
+    """Signs of heights on a grid: looked at closely only where those of a coarser one leave a change possible."""
+    coarse = points[:, ::_COARSE, ::_COARSE]
+    reach = sum(np.linalg.norm(np.diff(coarse, axis=axis), axis=-1).max(axis=(1, 2)) for axis in (1, 2))
     above = np.empty((len(rows), GRID, GRID), dtype=bool)
-    for index, row in enumerate(rows.tolist()):
-        face = pairs.boundary.faces[int(pairs.part[row])]
-        found = face.surface.roughly(points[which[index]].reshape(-1, 3))[0]
-        above[index] = (-face.sign * found > 0).reshape(GRID, GRID)
+    for part, some in grouped(pairs.part[rows]):
+        face = pairs.boundary.faces[part]
+        found, error = face.surface.roughly(coarse[which[some]].reshape(-1, 3))
+        count = coarse.shape[1]
+        heights, error = (values.reshape(len(some), count, count) for values in (-face.sign * found, error))
+        close = np.abs(heights) - error <= reach[which[some], None, None]
+        # The cells round each such place, on the finer grid.
+        cells = close[:, :-1, :-1] | close[:, 1:, :-1] | close[:, :-1, 1:] | close[:, 1:, 1:]
+        spread = np.kron(heights > 0, np.ones((_COARSE, _COARSE), dtype=bool))[:, :GRID, :GRID]
+        above[some] = spread[:, : GRID, : GRID]
+        row, i, j = np.nonzero(cells)
+        offsets = np.arange(_COARSE + 1)
+        at_i = (_COARSE * i)[:, None, None] + offsets[:, None] + 0 * offsets
+        at_j = (_COARSE * j)[:, None, None] + offsets + 0 * offsets[:, None]
+        at = np.broadcast_to(row[:, None, None], at_i.shape)
+        fine = np.zeros((len(some), GRID, GRID), dtype=bool)
+        fine[at, at_i, at_j] = True
+        at, at_i, at_j = np.nonzero(fine)
+        exact = face.surface.roughly(points[which[some]][at, at_i, at_j])[0]
+        above[some[at], at_i, at_j] = -face.sign * exact > 0
     return above
 
 

@@ -18,15 +18,20 @@ from scipy.spatial import cKDTree
 from gyroid_cad.common.arrays import dot, unit
 from gyroid_cad.nurbs.roots import foot_step
 
-__all__ = ["FreeForm", "Quadric", "QuadricKind", "Surface"]
+__all__ = ["FreeForm", "Quadric", "QuadricKind", "Surface", "Swept"]
 
 Floats = NDArray[np.float64]
 QuadricKind = Literal["plane", "cylinder", "cone", "sphere", "torus"]
 
 # Newton's method to the nearest place, in parts of the parameters' ranges.
-_STEPS, _CONVERGED, _LONGEST_STEP = 12, 1e-13, 0.05
+# Of a step so short the next one, which is its square, is rounding.
+_STEPS, _CONVERGED, _LONGEST_STEP = 12, 1e-8, 0.05
 # How far past its border a surface is followed, and how many samples it has along each side.
 _BEYOND, _SAMPLES = 0.02, 65
+# How far a squared distance must bend upwards at least for a whole step, in parts of the squared rate.
+_BENT = 1e-2
+# Of a curve's extent: so far aside of a plane it still lies in it.
+_IN_PLANE = 1e-9
 
 
 class Surface(Protocol):
@@ -55,12 +60,6 @@ class Surface(Protocol):
     def area_vectors(self, places: Floats) -> Floats:
         """Cross products of the derivatives by s and t, (n, 3), at parameters (n, 2)."""
         ...
-
-    @property
-    def gauss(self) -> tuple[int, int]:
-        """Equal pieces along t, and Gauss points in each, that integrate fluxes and areas."""
-        ...
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadric:
@@ -142,11 +141,6 @@ class Quadric:
         return np.asarray(self._handed * own @ self.axes)
 
     @property
-    def gauss(self) -> tuple[int, int]:
-        """As of :class:`Surface`."""
-        return {"plane": (1, 1), "cylinder": (1, 2), "cone": (1, 3), "sphere": (1, 9), "torus": (2, 9)}[self.kind]
-
-    @property
     def _handed(self) -> float:
         """-1 if the axes are left-handed: then the normal of the parameters points inwards."""
         return 1.0 if np.linalg.det(self.axes) > 0 else -1.0
@@ -180,7 +174,7 @@ class FreeForm:
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """As of :class:`Surface`."""
-        places = np.array(self._samples[0][self._tree.query(points)[1]] if near is None else near, dtype=float)
+        places = np.array(self.nearest_samples(points) if near is None else near, dtype=float)
         reach = self.high - self.low
         low, high = self.low - _BEYOND * reach, self.high + _BEYOND * reach
         left = np.arange(len(points))
@@ -198,6 +192,10 @@ class FreeForm:
         normals = unit(np.cross(ds, dt))
         return dot(points - x, normals), normals, places
 
+    def nearest_samples(self, points: Floats) -> Floats:
+        """Parameters of the sample that is nearest to each point; shape (n, 2)."""
+        return np.asarray(self._samples[0][self._tree.query(points)[1]])
+
     def roughly(self, points: Floats) -> tuple[Floats, Floats]:
         """As of :class:`Surface`: from the tangent plane at the nearest sample."""
         distance, nearest = self._tree.query(points)
@@ -212,11 +210,6 @@ class FreeForm:
         """As of :class:`Surface`."""
         _, ds, dt, *_ = self.derivatives(*places.T)
         return np.cross(ds, dt)
-
-    @property
-    def gauss(self) -> tuple[int, int]:
-        """As of :class:`Surface`."""
-        return 4, 6
 
     @cached_property
     def _samples(self) -> tuple[Floats, Floats, Floats, float]:
@@ -235,6 +228,115 @@ class FreeForm:
     @cached_property
     def _tree(self) -> cKDTree:
         return cKDTree(self._samples[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """A curve turned about an axis in whose plane it lies, or moved along a direction.
+
+    Attributes
+    ----------
+    free : FreeForm
+        The same surface, by its derivatives.
+    origin : ndarray, shape (3,)
+        On the axis.
+    axis : ndarray, shape (3,)
+        Unit vector along the axis, or of the direction.
+    curve : callable
+        From parameters (n,) to points and two derivatives.
+    turned : bool
+    """
+
+    free: FreeForm
+    origin: Floats
+    axis: Floats
+    curve: Callable[[Floats], tuple[Floats, ...]]
+    turned: bool
+
+    @property
+    def planar(self) -> bool:
+        """Whether the axis lies in the curve's plane, and the curve on one side of it."""
+        points = self.curve(np.linspace(self.free.low[1], self.free.high[1], 33))[0] - self.origin
+        x, y = self._across
+        size = np.ptp(points, axis=0).max()
+        return bool(np.abs(points @ y).max() < _IN_PLANE * size and np.min(points @ x) > -_IN_PLANE * size)
+
+    def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+        """As of :class:`Surface`: of the curve's own plane only one parameter is looked for."""
+        along = int(self.turned)
+        if near is None:
+            near = self.free.nearest_samples(points)
+        flat, frame, angle = self._flattened(points)
+        place = np.array(near[:, along], dtype=float)
+        low, high = (
+            bound[along] + sign * _BEYOND * (self.free.high - self.free.low)[along]
+            for bound, sign in ((self.free.low, -1), (self.free.high, 1))
+        )
+        left, reach = np.arange(len(points)), high - low
+        for _ in range(_STEPS):
+            at, rate, bend = self._profile(place[left])
+            apart = flat[left] - at
+            slope, curved = dot(apart, rate), dot(rate, rate)
+            whole = curved - dot(apart, bend)
+            step = slope / np.where(whole > _BENT * curved, whole, curved)
+            moved = np.clip(place[left] + np.clip(step, -_LONGEST_STEP * reach, _LONGEST_STEP * reach), low, high)
+            change = np.abs(moved - place[left]) / reach
+            place[left] = moved
+            left = left[change > _CONVERGED]
+            if not len(left):
+                break
+        at, rate, _ = self._profile(place)
+        across = unit(np.stack([rate[:, 1], -rate[:, 0]], axis=-1))
+        distance = dot(flat - at, across)
+        normals = across[:, :1] * frame[0] + across[:, 1:] * frame[1]
+        if self.turned:
+            return distance, normals, np.stack([angle, place], axis=-1)
+        height = (points - self.curve(place)[0]) @ self.axis
+        return distance, normals, np.stack([place, height], axis=-1)
+
+    def roughly(self, points: Floats) -> tuple[Floats, Floats]:
+        """As of :class:`Surface`."""
+        return self.free.roughly(points)
+
+    def points(self, places: Floats) -> Floats:
+        """As of :class:`Surface`."""
+        return self.free.points(places)
+
+    def area_vectors(self, places: Floats) -> Floats:
+        """As of :class:`Surface`."""
+        return self.free.area_vectors(places)
+
+    def _flattened(self, points: Floats) -> tuple[Floats, tuple[Floats, Floats], Floats]:
+        """Points in the plane of the profile, its two directions in space at each, and angles about the axis."""
+        own = points - self.origin
+        if not self.turned:
+            x, y = self._across
+            return own @ np.stack([x, y], axis=-1), (x, y), np.zeros(len(own))
+        height = own @ self.axis
+        out = own - height[:, np.newaxis] * self.axis
+        x, y = self._across
+        angle = np.arctan2(out @ y, out @ x)
+        along = np.linalg.norm(out, axis=1)
+        radial = np.cos(angle)[:, np.newaxis] * x + np.sin(angle)[:, np.newaxis] * y
+        return np.stack([along, height], axis=-1), (radial, np.broadcast_to(self.axis, own.shape)), angle
+
+    def _profile(self, t: Floats) -> tuple[Floats, ...]:
+        """The curve in that plane, and its derivatives."""
+        point, *rates = self.curve(t)
+        x, y = self._across
+        plane = np.stack([x, self.axis if self.turned else y], axis=-1)
+        return (point - self.origin) @ plane, *(rate @ plane for rate in rates)
+
+    @cached_property
+    def _across(self) -> tuple[Floats, Floats]:
+        """Directions across the axis: of a turned curve the first lies in its own plane."""
+        if self.turned:
+            middle = self.curve(np.linspace(self.free.low[1], self.free.high[1], 5))[0] - self.origin
+            out = middle - (middle @ self.axis)[:, np.newaxis] * self.axis
+            x = unit(out[np.argmax(np.linalg.norm(out, axis=1))][np.newaxis])[0]
+        else:
+            x = unit(np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])[np.newaxis])[0]
+        return x, np.cross(self.axis, x)
 
 
 def _nearer(apart: Floats, found: tuple[Floats, ...]) -> Floats:

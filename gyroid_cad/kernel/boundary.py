@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepTools import BRepTools_WireExplorer
+from OCP.Geom import Geom_BSplineSurface
 from OCP.GeomAbs import (
     GeomAbs_BSplineCurve,
     GeomAbs_BSplineSurface,
@@ -25,11 +26,11 @@ from OCP.GeomAbs import (
     GeomAbs_SurfaceOfRevolution,
     GeomAbs_Torus,
 )
-from OCP.Geom import Geom_BSplineSurface
 from OCP.gp import gp_Ax3, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+from scipy.interpolate import BSpline, NdBSpline
 
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import KernelError
@@ -37,10 +38,9 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex, as_wire
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
-from gyroid_cad.nurbs.basis import basis, quotients
-from gyroid_cad.nurbs.surface import point_derivatives
+from gyroid_cad.nurbs.basis import orders, quotients
 from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
-from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface, Swept
+from gyroid_cad.trim.surfaces import FreeForm, Quadric, QuadricKind, Surface, Swept
 
 __all__ = ["ReadBoundary", "read_boundary"]
 
@@ -136,20 +136,10 @@ def _edge(edge: TopoDS_Edge, vertices: NumberedShapes) -> BoundaryEdge:
 
 def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
     kind = adaptor.GetType()
-    if kind == GeomAbs_Plane:
-        return Quadric("plane", *_placed(adaptor.Plane().Position()))
-    if kind == GeomAbs_Cylinder:
-        cylinder = adaptor.Cylinder()
-        return Quadric("cylinder", *_placed(cylinder.Position()), cylinder.Radius())
-    if kind == GeomAbs_Cone:
-        cone = adaptor.Cone()
-        return Quadric("cone", *_placed(cone.Position()), cone.RefRadius(), cone.SemiAngle())
-    if kind == GeomAbs_Sphere:
-        sphere = adaptor.Sphere()
-        return Quadric("sphere", *_placed(sphere.Position()), sphere.Radius())
-    if kind == GeomAbs_Torus:
-        torus = adaptor.Torus()
-        return Quadric("torus", *_placed(torus.Position()), torus.MajorRadius(), torus.MinorRadius())
+    if (simple := _QUADRICS.get(kind)) is not None:
+        name, get, sizes = simple
+        element = getattr(adaptor, get)()
+        return Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
     free = FreeForm(_derivatives(adaptor), *face.range)
     if kind == GeomAbs_SurfaceOfExtrusion:
         direction = np.array(_values(adaptor.Direction()))
@@ -160,6 +150,16 @@ def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
         swept = Swept(free, at, along, _curve_in_space(adaptor.BasisCurve(), 2), True)
         return swept if swept.planar else free
     return free
+
+
+# What each simple surface is called here and by the kernel, and what its sizes are called.
+_QUADRICS: dict[Any, tuple[QuadricKind, str, tuple[str, ...]]] = {
+    GeomAbs_Plane: ("plane", "Plane", ()),
+    GeomAbs_Cylinder: ("cylinder", "Cylinder", ("Radius",)),
+    GeomAbs_Cone: ("cone", "Cone", ("RefRadius", "SemiAngle")),
+    GeomAbs_Sphere: ("sphere", "Sphere", ("Radius",)),
+    GeomAbs_Torus: ("torus", "Torus", ("MajorRadius", "MinorRadius")),
+}
 
 
 def _placed(position: gp_Ax3) -> tuple[Floats, Floats]:
@@ -199,10 +199,17 @@ def _of_spline(spline: Geom_BSplineSurface) -> Derivatives | None:
     degrees, knots = (spline.UDegree(), spline.VDegree()), (surface.knots_u, surface.knots_v)
     if any(np.ptp(k[: d + 1]) or np.ptp(k[-d - 1 :]) for k, d in zip(knots, degrees, strict=True)):
         return None
-    given = surface.control_points[np.newaxis], surface.weights, knots
+    # By scipy, which looks at the few functions alone that do not vanish: lofts have a hundred along each parameter.
+    weights = surface.weights[..., np.newaxis]
+    plain = NdBSpline(knots, surface.control_points * weights, degrees)
+    below = None if np.ptp(weights) == 0 else NdBSpline(knots, weights, degrees)
 
     def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
-        return tuple(some[0] for some in point_derivatives(*given, s[np.newaxis], t[np.newaxis], 2))
+        places = np.stack([s, t], axis=-1)
+        values = {order: plain(places, nu=order) for order in orders(2, 2)}
+        if below is None:
+            return tuple(value / surface.weights[0, 0] for value in values.values())
+        return tuple(quotients(values, {order: below(places, nu=order) for order in orders(2, 2)}).values())
 
     return found
 
@@ -312,13 +319,17 @@ def _spline(spline: Any, poles: Floats, order: int) -> Curve:
     weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])
     weighted = np.concatenate([poles * weights[:, np.newaxis], weights[:, np.newaxis]], axis=1)
 
-    if np.ptp(weights) == 0:
-        return lambda t: tuple(basis(knots, degree, t, k) @ poles for k in range(order + 1))
+    above, below = (
+        BSpline(knots, poles * weights[:, np.newaxis], degree),
+        BSpline(knots, weights[:, np.newaxis], degree),
+    )
+    derivatives = orders(order, 1)
 
     def found(t: Floats) -> tuple[Floats, ...]:
-        sums = [basis(knots, degree, t, k) @ weighted for k in range(order + 1)]
-        values = {(k,): some[:, :-1] for k, some in enumerate(sums)}
-        return tuple(quotients(values, {(k,): some[:, -1:] for k, some in enumerate(sums)}).values())
+        values = {of: above(t, of[0]) for of in derivatives}
+        if np.ptp(weights) == 0:
+            return tuple(value / weights[0] for value in values.values())
+        return tuple(quotients(values, {of: below(t, of[0]) for of in derivatives}).values())
 
     return found
 

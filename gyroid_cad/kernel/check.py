@@ -215,7 +215,6 @@ def measure_about(face: TopoDS_Shape, middle: NDArray[np.float64]) -> tuple[floa
     return float(volume.Mass()), float(area.Mass())
 
 
-
 def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Shape]:
     """The faces, edges or solids of a shape, one for each time it is used."""
     explorer = TopExp_Explorer(shape, kind)

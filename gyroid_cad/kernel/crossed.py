@@ -134,16 +134,12 @@ class _Realisation:
             return self.rim(edge.number)
         return self._on_rim(edge.number, self.vertex(edge.start), self.vertex(edge.end), edge.first, edge.last)
 
-    def _on_rim(
-        self, rim: int, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: float
-    ) -> TopoDS_Edge:
+    def _on_rim(self, rim: int, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: float) -> TopoDS_Edge:
         side, index = divmod(rim, self.complex.edge_count)
         patch = int(self.complex.edge_patches[index, 0])
         k = self.patch_edges[patch].index(index)
         edge = TopoDS_Edge()
-        self.builder.MakeEdge(
-            edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE
-        )
+        self.builder.MakeEdge(edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE)
         return self._bounded(edge, start, end, first, last)
 
     def _part_piece(self, edge: CutEdge) -> TopoDS_Edge:
@@ -194,7 +190,10 @@ class _Realisation:
                     k = self.patch_edges[patch].index(edge.number % self.complex.edge_count)
                     line, tolerance = self.geometry.border(patch, k), TOLERANCE
                 else:
-                    line, tolerance = self._plane_curve(self.cut.sections[edge.number].in_square), self._tolerance(edge.number)
+                    line, tolerance = (
+                        self._plane_curve(self.cut.sections[edge.number].in_square),
+                        self._tolerance(edge.number),
+                    )
                 self.builder.UpdateEdge(self.edge(number), line, surface, location, tolerance)
             self.builder.Add(made, self._wire(loop))
         self.builder.NaturalRestriction(made, piece.whole)

@@ -129,7 +129,9 @@ class BoundaryFace:
     @cached_property
     def range(self) -> tuple[Floats, Floats]:
         """Least and largest parameters."""
-        points = np.concatenate([coedge.polygon(_SAGS[0], np.full(2, np.inf)) for coedge in self.coedges])
+        points = np.concatenate(
+            [coedge.curve(np.linspace(coedge.first, coedge.last, _LEAST))[0] for coedge in self.coedges]
+        )
         scale = np.maximum(np.ptp(points, axis=0), np.finfo(float).tiny)
         points = np.concatenate([coedge.polygon(_SAGS[0], scale) for coedge in self.coedges])
         return points.min(axis=0), points.max(axis=0)

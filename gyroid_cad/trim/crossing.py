@@ -13,17 +13,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
-from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.trim.boundary import Boundary, BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.ends import by_number, ends_of, halved
 from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, pairs_of
-from gyroid_cad.trim.loops import linked, nested
+from gyroid_cad.trim.loops import decided, linked, nested
 from gyroid_cad.trim.nodes import part_nodes, rim_nodes
-from gyroid_cad.trim.paths import Ends, Paths, closed_paths, open_paths
+from gyroid_cad.trim.paths import closed_paths, open_paths
 from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
-from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["Crossing", "CutEdge", "CutLoops", "Uses", "cross"]
@@ -32,11 +30,10 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-_INWARDS = np.array([[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]])
+# In a control net.
 _CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 # Points along an edge of an outline, by which holes are told from what is round them.
 _OUTLINE = 9
-_PULLS = 6
 
 Uses = list[tuple[int, bool]]
 
@@ -173,90 +170,32 @@ def cross(
 
 
 class _Work:
+    """Nodes and curves found, and the vertices and edges made of them."""
+
     def __init__(self, made: Crossing, wall: Wall, cell_size: float) -> None:
-        self.made, self.wall = made, wall
-        complex, faces = wall.complex, made.faces
+        self.made = made
+        complex, faces, pairs = wall.complex, made.faces, made.pairs
         self.rims = faces.side[:, None] * complex.edge_count + complex.patch_edges[faces.patch]
         self.fans = faces.side[:, None] * complex.fan_count + complex.patch_fans[faces.patch]
         self.forward = complex.edge_forward[faces.patch]
-        self.rim_nodes = rim_nodes(made.pairs, self.rims, self.forward)
+        self.rim_nodes = rim_nodes(pairs, self.rims, self.forward)
         self.part_nodes = part_nodes(faces, made.boundary)
-        made.points += list(made.boundary.vertices)
-        self.first_rim_node = self._added(self.rim_nodes.points)
-        self.first_part_node = self._added(self.part_nodes.points)
-        self.edge_numbers: dict[tuple[str, int, int], int] = {}
-        self.nodes_of_rim = _by(self.rim_nodes.rim)
-        self.nodes_of_edge = _by(self.part_nodes.edge)
-        self.coedge_of: dict[tuple[int, int], int] = {}
-        self._find_sections(cell_size)
-
-    def _added(self, points: Floats) -> int:
-        first = len(self.made.points)
-        self.made.points += list(points)
-        return first
-
-    # Sections -------------------------------------------------------------------------------------------------------
-
-    def _find_sections(self, cell_size: float) -> None:
-        pairs = self.made.pairs
-        ends = self._ends()
+        self.nodes_of_rim, self.nodes_of_edge = by_number(self.rim_nodes.rim), by_number(self.part_nodes.edge)
+        ends, self.coedges = ends_of(pairs, self.rims, self.forward, self.rim_nodes, self.part_nodes)
         opened = open_paths(pairs, ends)
-        closed = _halved(closed_paths(pairs, opened), self.made)
-        self.made.sections += fitted_sections(pairs, opened, cell_size) + fitted_sections(pairs, closed, cell_size)
+        count = len(self.rim_nodes.rim) + len(self.part_nodes.edge)
+        closed, points = halved(closed_paths(pairs, opened), pairs, count)
+        made.sections += fitted_sections(pairs, opened, cell_size) + fitted_sections(pairs, closed, cell_size)
+        # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
+        self.first = len(made.boundary.vertices)
+        made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]
+        self.edge_numbers: dict[tuple[str, int, int], int] = {}
         self.sections_of_face: dict[int, list[int]] = {}
         self.sections_of_part: dict[int, list[int]] = {}
-        for number, section in enumerate(self.made.sections):
-            self.sections_of_face.setdefault(int(pairs.face[section.pair]), []).append(number)
-            self.sections_of_part.setdefault(int(pairs.part[section.pair]), []).append(number)
-            self._edge("section", number, 0, section.start, section.end, 0.0, 1.0)
-
-    def _ends(self) -> Ends:
-        pairs = self.made.pairs
-        key = {pair: k for k, pair in enumerate(zip(pairs.face.tolist(), pairs.part.tolist(), strict=True))}
-        rows: list[tuple[int, int, float, float, float, float]] = []
-        entering: list[int] = []
-        sides = _by(self.rims.ravel())
-        for node, (rim, part) in enumerate(zip(self.rim_nodes.rim.tolist(), self.rim_nodes.part.tolist(), strict=True)):
-            for flat in sides[rim]:
-                face, side = divmod(flat, 4)
-                along = self.rim_nodes.along[node] * (1 if self.forward[face, side] else -1)
-                u, v = square_points(side, np.array(along))
-                pair = key.get((face, part))
-                if pair is None:
-                    raise KernelError("a rim of the lattice crosses a face of the part that its patch does not meet")
-                rows.append((pair, self.first_rim_node + node, float(u), float(v), *self.rim_nodes.places[node]))
-                entering.append(-1 - side)
-        for node, (edge, face) in enumerate(zip(self.part_nodes.edge.tolist(), self.part_nodes.face.tolist(), strict=True)):
-            for part, index in self.made.boundary.users[edge]:
-                coedge = self.made.boundary.faces[part].coedges[index]
-                near = coedge.curve(self.part_nodes.along[[node]])[0][0]
-                pair = key.get((face, part))
-                if pair is None:
-                    raise KernelError("an edge of the part crosses a patch that its face does not meet")
-                up = self.part_nodes.upwards[node] == coedge.forward
-                into = up != (self.made.boundary.faces[part].sign > 0)
-                rows.append((pair, self.first_part_node + node, *self.part_nodes.places[node], *near))
-                entering.append(int(into))
-                self.coedge_of[self.first_part_node + node, 2 * part + int(into)] = index
-        table = np.array(rows).reshape(-1, 6)
-        pair, node = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
-        return self._settled(pair, node, table[:, 2:4], table[:, 4:], np.array(entering, dtype=np.int64))
-
-    def _settled(self, pair: Integers, node: Integers, places: Floats, near: Floats, entering: Integers) -> Ends:
-        """The ends, those on edges of the part pulled onto the curve: an edge need not quite lie on its faces."""
-        pairs = self.made.pairs
-        known = entering >= 0
-        comes_in = entering == 1
-        for step in range(_PULLS):
-            height, slopes, where, _ = pairs.heights(pair, places[:, :1], places[:, 1:], near[:, None])
-            near, slope = where[:, 0], slopes[:, 0]
-            if step == 0:
-                turned = np.stack([slope[:, 1], -slope[:, 0]], axis=-1)
-                side = np.where(known, 0, -1 - entering)
-                comes_in[~known] = np.sum(turned * _INWARDS[side], axis=1)[~known] > 0
-            back = -slope * (height[:, 0] / np.maximum(np.sum(slope**2, axis=1), np.finfo(float).tiny))[:, None]
-            places = np.where(known[:, None], places + back, places)
-        return Ends(pair, node, places, near, comes_in)
+        for number, section in enumerate(made.sections):
+            edge = self._edge("section", number, 0, self.first + section.start, self.first + section.end, 0.0, 1.0)
+            self.sections_of_face.setdefault(int(pairs.face[section.pair]), []).append(edge)
+            self.sections_of_part.setdefault(int(pairs.part[section.pair]), []).append(edge)
 
     # The lattice ----------------------------------------------------------------------------------------------------
 
@@ -270,10 +209,11 @@ class _Work:
                 rim, runs_on = int(self.rims[face, side]), bool(self.forward[face, side])
                 corners = int(self.fans[face, side]), int(self.fans[face, (side + 1) % 4])
                 first, last = corners if runs_on else corners[::-1]
-                stretches = self._rim_stretches(face, side, rim, first, last, bool(inside[np.searchsorted(fans, first)]))
+                begins_inside = bool(inside[np.searchsorted(fans, first)])
+                stretches = self._rim_stretches(rim, first, last, begins_inside)
                 cut |= rim in self.nodes_of_rim
                 links += [self._used(number, runs_on) for number in stretches]
-            links += [self._used(number_of, True) for number_of in self._section_edges(self.sections_of_face.get(face, []))]
+            links += [self._used(edge, True) for edge in self.sections_of_face.get(face, [])]
             if not links:
                 continue
             loops = linked(links, "a face of the lattice")
@@ -291,7 +231,9 @@ class _Work:
         rims = self.rims.ravel()
         crossed = np.isin(rims, self.rim_nodes.rim)
         told = np.zeros((2, len(fans)), dtype=bool)
-        for rim, first, last in zip(rims[crossed].tolist(), start[crossed].tolist(), end[crossed].tolist(), strict=True):
+        for rim, first, last in zip(
+            rims[crossed].tolist(), start[crossed].tolist(), end[crossed].tolist(), strict=True
+        ):
             nodes = self.nodes_of_rim[rim]
             told[int(not self.rim_nodes.inwards[nodes[0]]), first] = True
             told[int(self.rim_nodes.inwards[nodes[-1]]), last] = True
@@ -299,16 +241,20 @@ class _Work:
         corner[index.ravel()] = np.arange(index.size)
         face, which = np.divmod(corner, 4)
         nets = self.made.faces.nets
-        self.corner_points = np.array([nets[f][_CORNERS[k]] for f, k in zip(face.tolist(), which.tolist(), strict=True)])
+        self.corner_points = np.array(
+            [nets[f][_CORNERS[k]] for f, k in zip(face.tolist(), which.tolist(), strict=True)]
+        )
         self.corner_fans = fans
-        inside = _decided(len(fans), start[~crossed], end[~crossed], told, lambda some: in_part(self.corner_points[some]))
+        inside = decided(
+            len(fans), start[~crossed], end[~crossed], told, lambda some: in_part(self.corner_points[some])
+        )
         return fans, inside
 
-    def _rim_stretches(self, face: int, side: int, rim: int, first: int, last: int, inside: bool) -> list[int]:
+    def _rim_stretches(self, rim: int, first: int, last: int, inside: bool) -> list[int]:
         """Edges of a rim that lie in the part."""
         nodes = self.nodes_of_rim.get(rim, [])
         stops = [-1.0, *self.rim_nodes.along[nodes].tolist(), 1.0]
-        vertices = [None, *(self.first_rim_node + node for node in nodes), None]
+        vertices = [None, *(self.first + node for node in nodes), None]
         kept = []
         for k in range(len(stops) - 1):
             if inside:
@@ -333,7 +279,7 @@ class _Work:
         t = np.linspace(edge.first, edge.last, _OUTLINE)
         t = (t if link.forward else t[::-1])[:-1]
         if edge.kind == "section":
-            return _on(self.made.sections[edge.number].in_square, t)
+            return self.made.sections[edge.number].square(t)
         side = int(np.flatnonzero(self.rims[face] == edge.number)[0])
         if not self.forward[face, side]:
             t = -t
@@ -363,18 +309,17 @@ class _Work:
             told[int(not self._leaves(nodes[-1])), edges[number].end] = True
         plain = [number for number in range(len(edges)) if number not in self.nodes_of_edge]
         start, end = (np.array([getattr(edges[k], name) for k in plain], dtype=np.int64) for name in ("start", "end"))
-        inside = _decided(
-            told.shape[1], start, end, told, lambda some: in_region(self.made.boundary.vertices[some])
-        )
+        inside = decided(told.shape[1], start, end, told, lambda some: in_region(self.made.boundary.vertices[some]))
         return inside[[edge.start for edge in edges]]
 
     def _part_stretches(self, edge: int, inside: bool) -> list[tuple[int, bool, Hashable, Hashable]]:
-        """Edges along one of the part's, whether each lies in the region, and the nodes at its ends, None at corners."""
+        """Edges along one of the part's, whether each lies in the region, and nodes at its ends, None at corners."""
         own = self.made.boundary.edges[edge]
         nodes = self.nodes_of_edge.get(edge, [])
         stops = [own.first, *self.part_nodes.along[nodes].tolist(), own.last]
-        vertices = [own.start, *(self.first_part_node + node for node in nodes), own.end]
-        found = []
+        first = self.first + len(self.rim_nodes.rim)
+        vertices = [own.start, *(first + node for node in nodes), own.end]
+        found: list[tuple[int, bool, Hashable, Hashable]] = []
         for k in range(len(stops) - 1):
             number = self._edge("part", edge, k, vertices[k], vertices[k + 1], stops[k], stops[k + 1])
             found.append((number, inside, vertices[k] if k else None, vertices[k + 1] if k < len(nodes) else None))
@@ -406,7 +351,7 @@ class _Work:
                             first, last = last, first
                         links.append(_Link(first or corners[0], last or corners[1], edge, coedge.forward))
                 index += 1
-        for edge in self._section_edges(self.sections_of_part.get(number, [])):
+        for edge in self.sections_of_part.get(number, []):
             section = self.made.sections[self.made.edges[edge].number]
             forward = (bool(self.made.backwards[self.made.pairs.face[section.pair]]) == (face.sign > 0)) == wanted
             ends = self._on_face(number, section.start, True), self._on_face(number, section.end, False)
@@ -421,24 +366,21 @@ class _Work:
             uses = [[(link.edge, link.forward) for link in loops[index]] for index in group]
             into.append(CutLoops(number, uses, whole))
 
-    def _on_face(self, part: int, vertex: int, starts: bool) -> Hashable:
+    def _on_face(self, part: int, node: int, begins: bool) -> Hashable:
         """A node of a section on a face of the part: of a coedge, if it lies on one."""
-        index = self.coedge_of.get((vertex, 2 * part + int(starts)))
-        return ("node", vertex, index) if index is not None else ("inner", vertex)
+        index = self.coedges.get((node, part, begins))
+        return ("node", self.first + node, index) if index is not None else ("inner", node)
 
     def _on_part(self, face: BoundaryFace, link: _Link) -> Floats:
         edge = self.made.edges[link.edge]
         t = np.linspace(edge.first, edge.last, _OUTLINE)
         t = (t if link.forward else t[::-1])[:-1]
         if edge.kind == "section":
-            return _on(self.made.sections[edge.number].on_part, t)
+            return self.made.sections[edge.number].part(t)
         coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == link.forward)
         return coedge.curve(t)[0]
 
     # Edges ----------------------------------------------------------------------------------------------------------
-
-    def _section_edges(self, sections: list[int]) -> list[int]:
-        return [self.edge_numbers["section", number, 0] for number in sections]
 
     def _used(self, number: int, forward: bool) -> _Link:
         edge = self.made.edges[number]
@@ -451,60 +393,3 @@ class _Work:
             self.edge_numbers[key] = len(self.made.edges)
             self.made.edges.append(CutEdge(start, end, first, last, kind, number))
         return self.edge_numbers[key]
-
-
-def _halved(closed: Paths, made: Crossing) -> Paths:
-    """Closed curves in two halves, between two vertices of their own."""
-    pairs, starts, ends, places, near = [], [], [], [], []
-    for pair, square, part in zip(closed.pair.tolist(), closed.places, closed.near, strict=True):
-        middle = len(square) // 2
-        first = len(made.points)
-        points = made.pairs.heights(np.array([pair, pair]), square[[0, middle], :1], square[[0, middle], 1:])[3][:, 0]
-        made.points += list(points)
-        pairs += [pair, pair]
-        starts += [first, first + 1]
-        ends += [first + 1, first]
-        places += [square[: middle + 1], square[middle:]]
-        near += [part[: middle + 1], part[middle:]]
-    return Paths(*(np.array(some, dtype=np.int64) for some in (pairs, starts, ends)), places, near)
-
-
-def _decided(
-    count: int, start: Integers, end: Integers, told: Booleans, ask: Callable[[Integers], Booleans]
-) -> Booleans:
-    """Whether each of some corners is inside: those joined by an edge that nothing crosses are alike.
-
-    Parameters
-    ----------
-    count : int
-    start, end : ndarray of int
-        Of such edges.
-    told : ndarray of bool, shape (2, count)
-        Whether a crossing tells that a corner is outside, or inside.
-    ask : callable
-        For corners of which no crossing tells.
-    """
-    group = connected(count, start, end)
-    groups = int(group.max(initial=-1)) + 1
-    said = np.stack([np.bincount(group, told[k], groups) > 0 for k in (0, 1)])
-    if np.any(said.all(axis=0)):
-        raise KernelError("the crossings of lattice and part do not agree on what is inside")
-    inside = said[1]
-    unknown = np.flatnonzero(~said.any(axis=0))
-    if len(unknown):
-        first = np.full(groups, -1)
-        first[group[::-1]] = np.arange(count)[::-1]
-        inside[unknown] = ask(first[unknown])
-    return np.asarray(inside[group])
-
-
-def _by(numbers: Integers) -> dict[int, list[int]]:
-    """Positions of each number, in order."""
-    found: dict[int, list[int]] = {}
-    for position, number in enumerate(numbers.tolist()):
-        found.setdefault(number, []).append(position)
-    return found
-
-
-def _on(control: Floats, t: Floats) -> Floats:
-    return np.asarray(basis(section_knots(len(control)), 3, t) @ control)

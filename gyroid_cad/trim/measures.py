@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
-from gyroid_cad.nurbs.basis import basis, gauss_points
+from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.edge_crossings import square_points
-from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.trim.surfaces import Quadric
 from gyroid_cad.wall.offset import Wall
 
@@ -100,7 +99,7 @@ def _square_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
 
     def stretch(edge: CutEdge, forward: bool) -> Stretch:
         if edge.kind == "section":
-            return _along(cut.sections[edge.number].in_square, edge.first, edge.last)
+            return _along(cut.sections[edge.number].square, len(cut.sections[edge.number].in_square))
         side = sides.index(edge.number % complex.edge_count)
         sign = 1.0 if complex.edge_forward[patch, side] else -1.0
         # Of the other sides either the integral or the rate is 0.
@@ -114,9 +113,7 @@ def _square_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
     return _border(cut, piece, stretch)
 
 
-def _border(
-    cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], Stretch]
-) -> tuple[Floats, Floats]:
+def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], Stretch]) -> tuple[Floats, Floats]:
     """Places along a piece's border, and weights times the rate of the second parameter.
 
     Where two stretches meet, what is between their ends is part of the border too: an edge of the part need not quite
@@ -178,7 +175,7 @@ def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
 
     def stretch(edge: CutEdge, forward: bool) -> Stretch:
         if edge.kind == "section":
-            return _along(cut.sections[edge.number].on_part, edge.first, edge.last)
+            return _along(cut.sections[edge.number].part, len(cut.sections[edge.number].on_part))
         coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == forward)
         t, weights = gauss_points(np.linspace(edge.first, edge.last, _PART_PIECES + 1), _PER_STRETCH)
         places, rates, *_ = coedge.curve(np.concatenate([t, [edge.first, edge.last]]))
@@ -187,9 +184,7 @@ def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
     return _border(cut, piece, stretch)
 
 
-def _along(control: Floats, first: float, last: float) -> Stretch:
+def _along(curve: Callable[..., Floats], stations: int) -> Stretch:
     """Places and rates of a section curve at Gauss points between its stations, their weights, and its ends."""
-    knots = section_knots(len(control))
-    t, weights = gauss_points(np.linspace(first, last, len(control)), _PER_STRETCH)
-    rates = basis(knots, 3, t, 1) @ control[:, 1]
-    return basis(knots, 3, t) @ control, rates, weights, control[[0, -1]]
+    t, weights = gauss_points(np.linspace(0, 1, stations), _PER_STRETCH)
+    return curve(t), curve(t, 1)[:, 1], weights, curve(np.array([0.0, 1.0]))

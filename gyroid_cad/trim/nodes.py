@@ -129,9 +129,7 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     # Elsewhere a distance changes its sign by a leap, where another place of the surface becomes the nearest.
     real = np.abs(heights) < 1e-8 * pairs.faces.size
     real &= _in_faces(pairs.boundary, part[which], places, real)
-    which, along, side, slopes, places, points = (
-        some[real] for some in (which, along, side, slopes, places, points)
-    )
+    which, along, side, slopes, places, points = (some[real] for some in (which, along, side, slopes, places, points))
     rate, steepness = _rate(side, slopes), np.linalg.norm(slopes, axis=1)
     if np.any(np.abs(rate) <= _TOUCHING * steepness) or np.any(np.abs(along) > 1 - _AT_CORNER):
         raise KernelError("an edge of the lattice touches the part")
@@ -201,8 +199,8 @@ def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
 
 def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats, Floats, Floats]:
     """Edges of the part as straight segments: their edges, parameters of both ends, and both ends."""
-    edges, lows, highs, starts, ends = [np.zeros(0, dtype=np.int64)], [], [], [], []
-    lows.append(np.zeros(0)), highs.append(np.zeros(0)), starts.append(np.zeros((0, 3))), ends.append(np.zeros((0, 3)))
+    edges, lows, highs = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros(0)]
+    starts, ends = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for number, one in enumerate(boundary.edges):
         if one.curve is None:
             continue
@@ -253,7 +251,7 @@ def _tried(
         points = faces.on_grid(used, count).reshape(len(used), -1, 3)
         a = points[:, first][which]
         b, c = points[:, second][which] - a, points[:, third][which] - a
-        origin = (start[segment[some], None] - a)
+        origin = start[segment[some], None] - a
         direction = (end - start)[segment[some], None]
         across = np.cross(direction, c)
         determinant = dot(b, across)
@@ -289,7 +287,9 @@ def _converged(
         span = boundary.edges[number].last - boundary.edges[number].first
         for step in range(_NEWTON_STEPS + 1):
             place, rate, *_ = curve(unknown[rows, 0])
-            point, du, dv = (some[:, 0] for some in faces.derivatives(face[rows], *unknown[rows, 1:, None].transpose(1, 0, 2)))
+            point, du, dv = (
+                some[:, 0] for some in faces.derivatives(face[rows], *unknown[rows, 1:, None].transpose(1, 0, 2))
+            )
             normal = np.cross(du, dv)
             left[rows], points[rows] = place - point, point
             slope = dot(rate, normal) / np.maximum(

@@ -20,8 +20,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-# In the square, whose sides are 2 long; the second and third where curves come so near each other that the first is at a
-# loss.
+# In the square, whose sides are 2 long; shorter ones where curves come too near each other.
 _STEPS = (0.1, 0.02, 0.004)
 _LONGEST = 12.0
 _SHORTEST = 1e-5
@@ -222,12 +221,11 @@ def closed_paths(pairs: Pairs, known: Paths) -> Paths:
     pair, place = _unexplained(pairs, known)
     found: list[tuple[int, Floats, Floats]] = []
     done: dict[int, list[Floats]] = {}
-    for row in range(len(pair)):
-        number, start = pair[row], place[row]
-        if any(np.linalg.norm(path - start, axis=1).min() < 2 / (GRID - 1) for path in done.get(int(number), [])):
+    for number, start in zip(pair.tolist(), place, strict=True):
+        if any(np.linalg.norm(path - start, axis=1).min() < 2 / (GRID - 1) for path in done.get(number, [])):
             continue
-        found.append((int(number), *_round(pairs, number, start)))
-        done.setdefault(int(number), []).append(_dense(found[-1][1]))
+        found.append((number, *_round(pairs, number, start)))
+        done.setdefault(number, []).append(_dense(found[-1][1]))
     none = np.full(len(found), -1)
     numbers = np.array([number for number, _, _ in found], dtype=np.int64)
     return Paths(numbers, none, none, [places for _, places, _ in found], [near for _, _, near in found])
@@ -273,7 +271,7 @@ def _above(pairs: Pairs, rows: Integers, points: Floats, which: Integers) -> Boo
         # The cells round each such place, on the finer grid.
         cells = close[:, :-1, :-1] | close[:, 1:, :-1] | close[:, :-1, 1:] | close[:, 1:, 1:]
         spread = np.kron(heights > 0, np.ones((_COARSE, _COARSE), dtype=bool))[:, :GRID, :GRID]
-        above[some] = spread[:, : GRID, : GRID]
+        above[some] = spread[:, :GRID, :GRID]
         row, i, j = np.nonzero(cells)
         offsets = np.arange(_COARSE + 1)
         at_i = (_COARSE * i)[:, None, None] + offsets[:, None] + 0 * offsets
@@ -328,7 +326,9 @@ def _on_curves(
     kept = []
     for row in np.flatnonzero(good).tolist():
         paths = by_pair.get(int(pair[row]), [])
-        if any(np.linalg.norm(_dense(known.places[path], step / 4) - at[row], axis=1).min() < step / 4 for path in paths):
+        if any(
+            np.linalg.norm(_dense(known.places[path], step / 4) - at[row], axis=1).min() < step / 4 for path in paths
+        ):
             continue
         if pairs.boundary.faces[int(pairs.part[pair[row]])].contains(near[row])[0]:
             kept.append(row)
@@ -340,7 +340,10 @@ def _round(pairs: Pairs, pair: int, start: Floats) -> tuple[Floats, Floats]:
     number = np.array([pair])
     _, _, near = _onward(pairs, number, start[None], pairs.heights(number, start[None, :1], start[None, 1:])[2][:, 0])
     twice = Ends(
-        np.array([pair, pair]), np.array([0, 0]), np.stack([start, start]), np.concatenate([near, near]),
+        np.array([pair, pair]),
+        np.array([0, 0]),
+        np.stack([start, start]),
+        np.concatenate([near, near]),
         np.array([True, False]),
     )
     for step in _STEPS[1:]:

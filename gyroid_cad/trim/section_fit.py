@@ -54,6 +54,14 @@ class SectionCurve:
     on_part: Floats
     deviation: float
 
+    def square(self, t: Floats, derivative: int = 0) -> Floats:
+        """Places in the square at parameters in [0, 1], or their rate of change; shape (q, 2)."""
+        return np.asarray(basis(section_knots(len(self.in_square)), 3, t, derivative) @ self.in_square)
+
+    def part(self, t: Floats, derivative: int = 0) -> Floats:
+        """Parameters of the part's face, or their rate of change; shape (q, 2)."""
+        return np.asarray(basis(section_knots(len(self.on_part)), 3, t, derivative) @ self.on_part)
+
 
 def fitted_sections(pairs: Pairs, paths: Paths, cell_size: float) -> list[SectionCurve]:
     """Fit curves that were followed, each with as few control points as keep the splines together.

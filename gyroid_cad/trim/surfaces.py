@@ -61,6 +61,7 @@ class Surface(Protocol):
         """Cross products of the derivatives by s and t, (n, 3), at parameters (n, 2)."""
         ...
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadric:
     """A plane, cylinder, cone, sphere or torus, with the parameters that the kernel gives it.
@@ -181,7 +182,9 @@ class FreeForm:
         for _ in range(_STEPS):
             found = self.derivatives(*places[left].T)
             step = _nearer(points[left] - found[0], found)
-            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(step / reach).max(axis=1), _LONGEST_STEP))[:, None]
+            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(step / reach).max(axis=1), _LONGEST_STEP))[
+                :, None
+            ]
             moved = np.clip(places[left] + step, low, high)
             change = np.abs((moved - places[left]) / reach).max(axis=1)
             places[left] = moved
@@ -219,8 +222,14 @@ class FreeForm:
         x, ds, dt, dss, dst, dtt = self.derivatives(*places.T)
         with np.errstate(divide="ignore", invalid="ignore"):
             normals = unit(np.cross(ds, dt))
-            bends = [np.abs(dot(second, normals)) / squared for second, squared in (
-                (dss, dot(ds, ds)), (dtt, dot(dt, dt)), (dst, np.sqrt(dot(ds, ds) * dot(dt, dt))))]
+            bends = [
+                np.abs(dot(second, normals)) / squared
+                for second, squared in (
+                    (dss, dot(ds, ds)),
+                    (dtt, dot(dt, dt)),
+                    (dst, np.sqrt(dot(ds, ds) * dot(dt, dt))),
+                )
+            ]
         sound = np.isfinite(normals).all(axis=1)
         bend = float(np.max([np.max(some[np.isfinite(some)], initial=0.0) for some in bends]))
         return places[sound], x[sound], normals[sound], bend

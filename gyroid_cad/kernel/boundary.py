@@ -317,7 +317,6 @@ def _spline(spline: Any, poles: Floats, order: int) -> Curve:
     )
     degree = int(spline.Degree())
     weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])
-    weighted = np.concatenate([poles * weights[:, np.newaxis], weights[:, np.newaxis]], axis=1)
 
     above, below = (
         BSpline(knots, poles * weights[:, np.newaxis], degree),

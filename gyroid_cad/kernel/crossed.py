@@ -124,9 +124,8 @@ class _Realisation:
         if rim not in self.rims:
             index = rim % self.complex.edge_count
             side = rim // self.complex.edge_count
-            fans = self.complex.edge_fans[index].tolist()
-            ends = [self.fan_vertex(side * self.complex.fan_count + fan) for fan in fans]
-            self.rims[rim] = self._on_rim(rim, *ends, -1.0, 1.0)
+            start, end = (side * self.complex.fan_count + self.complex.edge_fans[index]).tolist()
+            self.rims[rim] = self._on_rim(rim, self.fan_vertex(start), self.fan_vertex(end), -1.0, 1.0)
         return self.rims[rim]
 
     def _rim_piece(self, edge: CutEdge) -> TopoDS_Edge:

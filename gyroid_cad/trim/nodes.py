@@ -129,7 +129,8 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     # Elsewhere a distance changes its sign by a leap, where another place of the surface becomes the nearest.
     real = np.abs(heights) < 1e-8 * pairs.faces.size
     real &= _in_faces(pairs.boundary, part[which], places, real)
-    which, along, side, slopes, places, points = (some[real] for some in (which, along, side, slopes, places, points))
+    which, side, along = which[real], side[real], along[real]
+    slopes, places, points = slopes[real], places[real], points[real]
     rate, steepness = _rate(side, slopes), np.linalg.norm(slopes, axis=1)
     if np.any(np.abs(rate) <= _TOUCHING * steepness) or np.any(np.abs(along) > 1 - _AT_CORNER):
         raise KernelError("an edge of the lattice touches the part")

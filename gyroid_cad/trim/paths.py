@@ -251,10 +251,11 @@ def _unexplained(pairs: Pairs, known: Paths) -> tuple[Integers, Floats]:
         for row in np.flatnonzero(changes.any(axis=(1, 2))).tolist():
             for path in by_pair.get(int(rows[row]), []):
                 _cross_out(changes[row], known.places[path], step)
-        row, i, j = np.nonzero(changes)
-        cells.append(np.stack([rows[row], i, j], axis=1))
+        found = np.nonzero(changes)
+        cells.append(np.stack([rows[found[0]], *found[1:]], axis=1))
     flat = np.concatenate(cells) if cells else np.zeros((0, 3), dtype=np.int64)
-    return _on_curves(pairs, flat[:, 0], -1 + step * (flat[:, 1:] + 0.5), known, by_pair, step)
+    middles: Floats = np.asarray(-1 + step * (flat[:, 1:] + 0.5))
+    return _on_curves(pairs, flat[:, 0], middles, known, by_pair, step)
 
 
 def _above(pairs: Pairs, rows: Integers, points: Floats, which: Integers) -> Booleans:

@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 # Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
 _STATIONS = (8, 16, 32, 64, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
-_NEWTON_STEPS = 8
+_NEWTON_STEPS, _CONVERGED = 8, 1e-11
 # So many functions on either side of its own do not vanish at a station that is nearly in its even place.
 _BAND = 4
 # In steps between stations.
@@ -143,7 +143,7 @@ def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) ->
         step = -slopes * (heights / steepness)[..., None]
         step[:, [0, -1]] = 0
         length = np.linalg.norm(step, axis=-1, keepdims=True)
-        if length.max(initial=0.0) < 1e-13:
+        if length.max(initial=0.0) < _CONVERGED:
             break
         stations[..., :2] += step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1))
     stations[..., 2:] = near

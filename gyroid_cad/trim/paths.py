@@ -135,7 +135,9 @@ def _followed(
         short = live[~good]
         step[short] /= 2
         go = live[good]
-        hit = _hit(targets[go], place[go], tried[good], step[go], ends)
+        # On a surface that closes on itself a curve ends where the next one begins.
+        own = (travelled[go] == 0)[:, None] & (ends.node[targets[go]] == ends.node[starts[go]][:, None])
+        hit = _hit(np.where(own, -1, targets[go]), place[go], tried[good], step[go], ends)
         reached[go] = hit
         done = (hit >= 0)[:, None]
         for path, square, part in zip(

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import KernelError
-from gyroid_cad.nurbs.roots import roots
+from gyroid_cad.nurbs.roots import foot_step, roots
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, grouped
@@ -30,12 +30,12 @@ _RIM_SAMPLES = 65
 _LOOKED_AT = 9
 # The sine of an angle at which an edge touches a face, and how near a corner a node may be, in parts of the edge.
 _TOUCHING, _AT_CORNER = 1e-6, 1e-6
-# Triangles along each side of a face, by which edges of the part are first looked for; how far beyond a triangle and a
-# segment one is tried, in parts of either.
-_TRIANGLES, _MARGIN = 8, 0.2
+# Places of a face, along each side, from the nearest of which the foot of a perpendicular is looked for, in so many
+# steps; how far beyond its rim; and parts of a segment at whose ends.
+_STARTS, _FOOT_STEPS, _REACHED, _PARTS, _MARGIN = 7, 5, 1.15, 5, 0.2
 _SEGMENT, _TURN, _MOST_SEGMENTS = 0.1, 0.15, 4096
 _NEWTON_STEPS = 20
-_AT_ONCE = 2**20
+_AT_ONCE = 2**12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,9 +193,8 @@ def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
         integers = np.zeros(0, dtype=np.int64)
         return PartNodes(integers, integers, none, none > 0, np.zeros((0, 2)), np.zeros((0, 3)))
     face, segment = _near(faces, start, end)
-    face, segment, along, u, v = _tried(faces, face, segment, start, end)
-    along = low[segment] + along * (high - low)[segment]
-    return _converged(faces, boundary, edge[segment], face, along, u, v)
+    row, along, u, v = _tried(faces, boundary, face, edge[segment], low[segment], high[segment])
+    return _converged(faces, boundary, edge[segment][row], face[row], along, u, v)
 
 
 def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats, Floats, Floats]:
@@ -234,43 +233,80 @@ def _near(faces: LatticeFaces, start: Floats, end: Floats) -> tuple[Integers, In
 
 
 def _tried(
-    faces: LatticeFaces, face: Integers, segment: Integers, start: Floats, end: Floats
-) -> tuple[Integers, Integers, Floats, Floats, Floats]:
-    """Segments that meet triangles of faces, or nearly so: where, along the segment and on the face."""
-    count = _TRIANGLES + 1
-    along = np.linspace(-1, 1, count)
-    corner = np.arange(_TRIANGLES)
-    i, j = (grid.ravel() for grid in np.meshgrid(corner, corner, indexing="ij"))
-    first = np.concatenate([i * count + j, (i + 1) * count + j + 1])
-    second = np.concatenate([(i + 1) * count + j, i * count + j + 1])
-    third = np.concatenate([i * count + j + 1, (i + 1) * count + j])
-    places = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
-    found = []
-    at_once = max(1, _AT_ONCE // len(first))
-    for some in np.split(np.arange(len(face)), range(at_once, len(face), at_once)):
-        used, which = np.unique(face[some], return_inverse=True)
-        points = faces.on_grid(used, count).reshape(len(used), -1, 3)
-        a = points[:, first][which]
-        b, c = points[:, second][which] - a, points[:, third][which] - a
-        origin = start[segment[some], None] - a
-        direction = (end - start)[segment[some], None]
-        across = np.cross(direction, c)
-        determinant = dot(b, across)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            p = dot(origin, across) / determinant
-            turned = np.cross(origin, b)
-            q = dot(direction, turned) / determinant
-            t = dot(c, turned) / determinant
-        hit = (p > -_MARGIN) & (q > -_MARGIN) & (p + q < 1 + _MARGIN) & (t > -_MARGIN) & (t < 1 + _MARGIN)
-        row, triangle = np.nonzero(hit)
-        origin_place = places[first[triangle]]
-        place = (
-            origin_place
-            + p[hit][:, None] * (places[second[triangle]] - origin_place)
-            + q[hit][:, None] * (places[third[triangle]] - origin_place)
-        )
-        found.append((face[some][row], segment[some][row], t[hit], place[:, 0], place[:, 1]))
+    faces: LatticeFaces, boundary: Boundary, face: Integers, edge: Integers, low: Floats, high: Floats
+) -> tuple[Integers, Floats, Floats, Floats]:
+    """Places along segments of the part's edges where the height above a face changes its sign, or all but does.
+
+    Returns
+    -------
+    row : ndarray of int, shape (n,)
+        Of the given pairs.
+    along, u, v : ndarray, shape (n,)
+    """
+    parts = np.linspace(0, 1, _PARTS + 1)
+    found: list[tuple[Integers, Floats, Floats, Floats]] = []
+    for first in range(0, len(face), _AT_ONCE):
+        rows = np.arange(first, min(first + _AT_ONCE, len(face)))
+        ends = np.stack([low[rows], high[rows]], axis=1)
+        points = _on_edges(boundary, edge[rows], ends)
+        heights, _ = _heights(faces, face[rows], points)
+        length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        # No place of a segment is further from one of its ends than its length.
+        rows = rows[np.abs(heights).min(axis=1) <= length]
+        t = low[rows, None] + parts * (high - low)[rows, None]
+        points = _on_edges(boundary, edge[rows], t)
+        heights, places = _heights(faces, face[rows], points)
+        above = heights > 0
+        row, index = np.nonzero(above[:, 1:] != above[:, :-1])
+        before, after = heights[row, index], heights[row, index + 1]
+        share = before / (before - after)
+        found.append(_between(rows, t, places, row, index, share))
+        # Where a height turns back between samples it may cross zero twice: both are tried.
+        bend = heights[:, :-2] - 2 * heights[:, 1:-1] + heights[:, 2:]
+        turning = (np.sign(heights[:, 1:-1]) * bend > 0) & (np.abs(heights[:, 1:-1]) < np.abs(bend))
+        row, index = np.nonzero(turning)
+        found += [_between(rows, t, places, row, index + k, np.full(len(row), 0.5)) for k in (0, 1)]
     return tuple(np.concatenate(some) for some in zip(*found, strict=True))  # type: ignore[return-value]
+
+
+def _between(
+    rows: Integers, t: Floats, places: Floats, row: Integers, index: Integers, share: Floats
+) -> tuple[Integers, Floats, Floats, Floats]:
+    """Rows, parameters and places of a face so far between a sample and the next."""
+    along = t[row, index] + share * (t[row, index + 1] - t[row, index])
+    place = places[row, index] + share[:, None] * (places[row, index + 1] - places[row, index])
+    return rows[row], along, place[:, 0], place[:, 1]
+
+
+def _on_edges(boundary: Boundary, edge: Integers, t: Floats) -> Floats:
+    points = np.empty((*t.shape, 3))
+    for number, rows in grouped(edge):
+        curve = boundary.edges[number].curve
+        assert curve is not None
+        points[rows] = curve(t[rows].ravel())[0].reshape(*t[rows].shape, 3)
+    return points
+
+
+def _heights(faces: LatticeFaces, face: Integers, points: Floats) -> tuple[Floats, Floats]:
+    """Signed distances of points (m, q, 3) from faces (m,) that go on a little beyond their rims, and the places."""
+    along = np.linspace(-1, 1, _STARTS)
+    starts = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
+    used, which = np.unique(face, return_inverse=True)
+    grid = faces.on_grid(used, _STARTS).reshape(len(used), -1, 3)[which]
+    nearest = np.stack(
+        [np.argmin(np.sum((grid - points[:, k, None]) ** 2, axis=-1), axis=1) for k in range(points.shape[1])], axis=1
+    )
+    places = starts[nearest]
+    for step in range(_FOOT_STEPS + 1):
+        last = step == _FOOT_STEPS
+        x, du, dv, *bends = faces.derivatives(face, places[..., 0], places[..., 1], 1 if last else 2)
+        if last:
+            break
+        u, v, sound = foot_step(points - x, du, dv, *bends)
+        change = np.where(sound[..., None], np.stack([u, v], axis=-1), 0.0)
+        places = np.clip(places + np.clip(change, -0.3, 0.3), -_REACHED, _REACHED)
+    normals = np.cross(du, dv)
+    return dot(points - x, normals) / np.linalg.norm(normals, axis=-1), places
 
 
 def _converged(

@@ -97,17 +97,19 @@ def _face(face: TopoDS_Face, edges: NumberedShapes) -> BoundaryFace:
     forward = as_face(face.Oriented(TopAbs_FORWARD))
     loops = [_loop(wire, forward, edges) for wire in parts_of(forward, TopAbs_WIRE)]
     low, high = np.array(corners_of(box_round([face])))
-    periods = tuple(
-        period() if periodic() else 0.0
-        for periodic, period in (
-            (adaptor.IsUPeriodic, adaptor.UPeriod),
-            (adaptor.IsVPeriodic, adaptor.VPeriod),
-        )
+    periods = (
+        adaptor.UPeriod() if adaptor.IsUPeriodic() else _round(adaptor.IsUClosed(), adaptor, "U"),
+        adaptor.VPeriod() if adaptor.IsVPeriodic() else _round(adaptor.IsVClosed(), adaptor, "V"),
     )
     sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
     made = BoundaryFace(None, sign, loops, periods, low, high)  # type: ignore[arg-type]
     made.surface = _surface(adaptor, made)
     return made
+
+
+def _round(closed: bool, adaptor: BRepAdaptor_Surface, along: str) -> float:
+    """Range of the parameters of a surface that closes; 0 if it does not."""
+    return float(getattr(adaptor, f"Last{along}Parameter")() - getattr(adaptor, f"First{along}Parameter")()) * closed
 
 
 def _loop(wire: TopoDS_Shape, face: TopoDS_Face, edges: NumberedShapes) -> list[Coedge]:

@@ -109,7 +109,7 @@ class BoundaryFace:
     loops : list of list of Coedge
         As they run round the face, which is on their left where the normal of the parameters points towards one.
     periods : tuple of float
-        Of the parameters; 0 where they have none.
+        Of the parameters, or the range of those of a surface that closes; 0 where they have none.
     low, high : ndarray, shape (3,)
         Of a box round it, in mm.
     """
@@ -136,11 +136,15 @@ class BoundaryFace:
         points = np.concatenate([coedge.polygon(_SAGS[0], scale) for coedge in self.coedges])
         return points.min(axis=0), points.max(axis=0)
 
-    def unwound(self, places: Floats) -> Floats:
-        """Parameters (n, 2) moved by whole periods to where the face is."""
+    def unwound(self, places: Floats, near: Floats | None = None) -> Floats:
+        """Parameters (n, 2) moved by whole periods to where the face is, or as near to others as can be."""
+        if not any(self.periods):
+            return places
         low, high = self.range
         period = np.array(self.periods)
-        turns = np.round(((low + high) / 2 - places) / np.where(period > 0, period, np.inf))
+        turns = np.round(
+            ((low + high) / 2 - places if near is None else near - places) / np.where(period, period, np.inf)
+        )
         return np.asarray(places + period * turns)
 
     def contains(self, places: Floats) -> Booleans:

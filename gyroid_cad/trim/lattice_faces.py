@@ -124,7 +124,7 @@ class Pairs:
             found, gradient, where = face.surface.distances(points[rows].reshape(-1, 3), guess)
             inwards = -face.sign * gradient.reshape(*points[rows].shape)
             heights[rows] = -face.sign * found.reshape(points[rows].shape[:2])
-            places[rows] = face.unwound(where).reshape(*points[rows].shape[:2], 2)
+            places[rows] = face.unwound(where, guess).reshape(*points[rows].shape[:2], 2)
             slopes[rows] = np.stack([dot(du[rows], inwards), dot(dv[rows], inwards)], axis=-1)
         return heights, slopes, places, points
 

@@ -143,6 +143,7 @@ FILL = (
     _row("skin"),
     _row("openings", "--opening"),
     _row("solids", "--solid"),
+    _row("partial"),
     _row("origin"),
     _row("rotation"),
     _row("drop islands"),

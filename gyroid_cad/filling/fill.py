@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -188,6 +188,7 @@ def fill(
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
     solids: Sequence[str | int] = (),
+    partial: bool = False,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -226,13 +227,16 @@ def fill(
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
+        size, thickness, density and surface are its own. It is placed by its own origin and rotation first. Cells are
+        added round it until it covers the part, as far as its fields and its map go on.
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
     solids : sequence of str or int
         Which of the part's solids are filled: names that its file or assembly gives them, or numbers from 1. All of
         them if left out.
+    partial : bool
+        Fill what the given lattice reaches, even if that is not all of the part; the report says how much it is not.
 
     Returns
     -------
@@ -265,7 +269,7 @@ def fill(
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     regions, size, settings, infill_in = described_infill(
-        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
+        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
     parts, remarks = parts_of(part, solids)
     for remark in remarks:
@@ -277,14 +281,17 @@ def fill(
             require_cover(whole.low, whole.high, size, settings.control_points)
         hollow = None if shell is None else hollowed(whole, shell, faces)
         core = whole if hollow is None else hollow.core
-        filling = Filling(whole, hollow, regions, partial(infill_in, core), size, told)
+        filling = Filling(whole, hollow, regions, functools.partial(infill_in, core), size, told)
         with _naming(name if len(parts) > 1 else ""):
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
         made.append(_reported(filling, replace(outcome, domains=domains), left, kind, shell, grams))
         islands += left
     islands.warn("drop_islands drops")
-    return _together(made, remarks)
+    filled = _together(made, remarks)
+    if filled.report.uncovered:
+        warn_caller(f"{100 * filled.report.uncovered:.3g} % of the part is out of the lattice's reach", PartWarning)
+    return filled
 
 
 def _opened(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[list[Any]]:
@@ -354,5 +361,6 @@ def _reported(
         shift=(x, y, z),
         seconds=dict(filling.seconds),
         cells_alike=outcome.infill.grading.cells_alike,
+        uncovered=outcome.infill.uncovered,
     )
     return Filled(shapes, report)

@@ -99,7 +99,7 @@ class GyroidFill(Part):  # type: ignore[misc]
     ----------
     part : Part, Solid or Compound, optional
         In a builder, the part made so far if left out.
-    cell_size, thickness, density, kind, skin, openings
+    cell_size, thickness, density, kind, skin, openings, core
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings may be faces of the part,
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
@@ -138,6 +138,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         *,
         skin: float | None = None,
         openings: Sequence[Any] = (),
+        core: Any = None,
         mode: Mode = Mode.REPLACE,
         origin: Point = (0.0, 0.0, 0.0),
         rotation: Point = (0.0, 0.0, 0.0),
@@ -169,6 +170,7 @@ class GyroidFill(Part):  # type: ignore[misc]
             material_density,
             skin=skin,
             openings=openings,
+            core=core,
             tolerance=tolerance,
             lattice=lattice,
             surface=surface,

@@ -109,6 +109,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     origin: Point = (0.0, 0.0, 0.0),
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
@@ -127,8 +128,8 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin, openings, origin, rotation, fit, drop_islands, keep_islands, tolerance, \
-    lattice, surface, solids, partial
+    cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
+    tolerance, lattice, surface, solids, partial
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -166,6 +167,7 @@ def gyroid_fill(
         drop_islands,
         skin=skin,
         openings=[*openings, *selected],
+        core=core,
         tolerance=tolerance,
         lattice=lattice,
         surface=surface,

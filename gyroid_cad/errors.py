@@ -17,6 +17,7 @@ __all__ = [
     "MissingHostError",
     "ParameterError",
     "PartWarning",
+    "SealedVoidsWarning",
     "SelfIntersectionError",
     "host_import",
 ]
@@ -258,6 +259,21 @@ class PartWarning(UserWarning):
     ...     filled = fill(pair, cell_size=8, density=0.3, fit=FitSettings(5))
     >>> filled.report.remarks
     ('solid 1 of 2 and solid 2 of 2 have 16 mm3 in common: united',)
+    """
+
+
+class SealedVoidsWarning(UserWarning):
+    """A filled part encloses space that nothing, no resin and no powder, can leave.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, fill
+    >>> from gyroid_cad.errors import SealedVoidsWarning
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", SealedVoidsWarning)
+    ...     filled = fill(cq.Workplane().box(4, 4, 4), 8, density=0.2, skin=0.5, fit=FitSettings(5))
     """
 
 

@@ -44,7 +44,7 @@ from gyroid_cad.errors import ParameterError
 __all__ = ["fill_command"]
 
 # Of the part and of how it is filled, whatever lattice fills it.
-_OWN = ("kind", "skin", "origin", "rotation", "drop_islands", "keep_islands", "material_density", "partial")
+_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density", "partial")
 
 
 def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
@@ -95,6 +95,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "may be repeated.",
 )
 @click.option(
+    "--core",
+    metavar="FILE",
+    shell_complete=file_paths,
+    help="Instead of --skin, the inner solid that is filled, of a STEP or BREP file: the skin is the part less it.",
+)
+@click.option(
     "--solid",
     multiple=True,
     metavar="NAME",
@@ -132,6 +138,7 @@ def fill_command(
     \b
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --skin 1 --opening ">Z"
+    gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --core inner.step
     gyroid-cad fill machine.step -o light.step --cell-size 7 --density 0.30 --solid bracket
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
     gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
@@ -150,7 +157,8 @@ def fill_command(
     if print_config:
         click.echo(printed_options(), nl=False)
         return
-    _require_another_file(part, output)
+    for read in filter(None, (part, given["core"])):
+        _require_another_file(read, output)
     written = {name: given[name] for name in ("schema", "deviation", "angle")}
     require_settings((1, 1, 1), **written)
     checked = None if printer is None else check_by(printer)
@@ -171,16 +179,16 @@ def fill_command(
             print_check_table(check)
 
 
-def _require_another_file(part: str, output: Sequence[str]) -> None:
-    """Check the files to be written: none of them may be the part itself.
+def _require_another_file(read: str, output: Sequence[str]) -> None:
+    """Check the files to be written: none of them may be one that is read.
 
     Raises
     ------
     ParameterError
     """
     for path in require_formats(output):
-        if path.exists() and Path(part).exists() and path.samefile(part):
-            raise ParameterError("output", str(path), "another file than the part that is filled")
+        if path.exists() and Path(read).exists() and path.samefile(read):
+            raise ParameterError("output", str(path), "another file than the part that is filled and its core")
 
 
 def _settings(given: dict[str, Any]) -> dict[str, Any]:

@@ -142,6 +142,7 @@ FILL = (
     _row("kind"),
     _row("skin"),
     _row("openings", "--opening"),
+    _row("core"),
     _row("solids", "--solid"),
     _row("partial"),
     _row("origin"),

@@ -21,14 +21,14 @@ from gyroid_cad.common.progress import Progress, named_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.infill import described_infill, require_cover
-from gyroid_cad.filling.part import Filling, Outcome, parts_of, without_islands
+from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report
-from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, grams_of, skin_of
+from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part, require_part, selected_faces
-from gyroid_cad.kernel.skin import has_face
+from gyroid_cad.kernel.skin import Hollow, has_face, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
@@ -37,7 +37,7 @@ from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.trim.islands import Islands, island_rule, warn_caller
+from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.parameters import valid_tolerance
 
@@ -183,6 +183,7 @@ def fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
@@ -223,6 +224,9 @@ def fill(
     openings : sequence
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it.
+    core : shape, Workplane or path-like, optional
+        Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
+        core, open wherever the core comes to the part's boundary.
     tolerance : float, optional
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
@@ -260,11 +264,7 @@ def fill(
     """
     frame = frame_of(*placement(origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
-    shell = None if skin is None else skin_of(skin)
-    if openings and shell is None:
-        raise ParameterError("openings", openings, "none without a skin")
-    if shell is not None and kind == SURFACE:
-        raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
+    shell = checked_skin(skin, openings, core, kind)
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
@@ -272,6 +272,8 @@ def fill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
     parts, remarks = parts_of(part, solids)
+    if core is not None and len(parts) > 1:
+        raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
         warn_caller(remark, PartWarning)
     made, islands = [], Islands()
@@ -279,19 +281,32 @@ def fill(
         told = progress if len(parts) == 1 else named_progress(progress, name)
         if lattice is None:
             require_cover(whole.low, whole.high, size, settings.control_points)
-        hollow = None if shell is None else hollowed(whole, shell, faces)
-        core = whole if hollow is None else hollow.core
-        filling = Filling(whole, hollow, regions, functools.partial(infill_in, core), size, told)
+        hollow = _hollow(whole, shell, faces, core)
+        inner = whole if hollow is None else hollow.core
+        filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
         with _naming(name if len(parts) > 1 else ""):
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
-        made.append(_reported(filling, replace(outcome, domains=domains), left, kind, shell, grams))
+        domains, voids = without_specks(domains, filling)
+        made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))
         islands += left
     islands.warn("drop_islands drops")
-    filled = _together(made, remarks)
-    if filled.report.uncovered:
-        warn_caller(f"{100 * filled.report.uncovered:.3g} % of the part is out of the lattice's reach", PartWarning)
-    return filled
+    together = _together(made, remarks)
+    warn_of_voids(together.report.voids)
+    if together.report.uncovered:
+        warn_caller(f"{100 * together.report.uncovered:.3g} % of the part is out of the lattice's reach", PartWarning)
+    return together
+
+
+def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) -> Hollow | None:
+    """The part in skin and core, if it has a skin."""
+    if core is None:
+        return None if skin is None else hollowed(part, skin, openings)
+    try:
+        inner = part_of(core)
+    except ParameterError as refused:
+        raise ParameterError("core", refused.value, refused.accepted) from None
+    return hollow_round(part, inner)
 
 
 def _opened(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[list[Any]]:
@@ -323,10 +338,16 @@ def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
 
 
 def _reported(
-    filling: Filling, outcome: Outcome, islands: Islands, kind: Kind, skin: float | None, grams: float | None
+    filling: Filling,
+    outcome: Outcome,
+    islands: Islands,
+    voids: tuple[SealedVoid, ...],
+    kind: Kind,
+    grams: float | None,
 ) -> Filled:
 
     domains = outcome.domains
+    skin = None if filling.hollow is None else filling.hollow.thickness
     shapes = {
         name: some[0].shape if len(some) == 1 else compound_of(made.shape for made in some)
         for name, some in domains.items()
@@ -355,6 +376,7 @@ def _reported(
         islands_volume=islands.kept_volume,
         dropped=islands.dropped,
         dropped_volume=islands.dropped_volume,
+        voids=voids,
         cut_patches=outcome.cut,
         whole_patches=outcome.whole,
         by_sections=outcome.by_sections,

@@ -20,7 +20,7 @@ from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
-from gyroid_cad.kernel.check import compound_of, is_valid, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, sealed_shells, topology, without_shells
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.repair import separate_solids
@@ -29,10 +29,10 @@ from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.kernel.split import bounded_solids, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
-from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
+from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "part_of", "parts_of", "without_islands"]
+__all__ = ["Filling", "Made", "Outcome", "part_of", "parts_of", "without_islands", "without_specks"]
 
 Floats = NDArray[np.float64]
 
@@ -274,6 +274,39 @@ def without_islands(
         chosen[name] = [some[index] for index in kept]
         islands += islands_of([piece.volume for piece in some], kept)
     return chosen, islands
+
+
+def without_specks(
+    domains: dict[str, list[Made]], filling: Filling
+) -> tuple[dict[str, list[Made]], tuple[SealedVoid, ...]]:
+    """Return the solids of every domain without specks of void, and the voids that they enclose, the largest first.
+
+    The part's own voids are none that filling sealed.
+
+    Parameters
+    ----------
+    domains : dict
+        As of :class:`Outcome`. What a wall leaves and the bare surface enclose nothing.
+    filling : Filling
+        That they come from.
+    """
+    least, voids = speck_below(filling.cell_size), []
+    chosen = dict(domains)
+    for name in (region.name for region in filling.regions if not (region.fluid or region.surface)):
+        chosen[name] = []
+        for made in domains.get(name, ()):
+            sealed = sealed_shells(made.shape, filling.part.shape)
+            voids += [SealedVoid(volume, place) for _, volume, place in sealed if volume >= least]
+            specks = [shell for shell, volume, _ in sealed if volume < least]
+            chosen[name].append(_without(made, specks) if specks else made)
+    return {name: some for name, some in chosen.items() if some}, tuple(sorted(voids, key=lambda void: -void.volume))
+
+
+def _without(made: Made, shells: Sequence[KernelShape]) -> Made:
+    """A solid that is filled where some of its shells run round voids."""
+    sizes = np.array([measure(shell) for shell in shells])
+    volume, area = np.abs(sizes).sum(axis=0).tolist()
+    return Made(without_shells(made.shape, shells), made.volume + volume, made.area - area)
 
 
 def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:

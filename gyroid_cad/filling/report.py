@@ -9,6 +9,7 @@ from typing import Any
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind
 from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
+from gyroid_cad.trim.islands import SealedVoid
 
 __all__ = ["FillReport", "joint_report"]
 
@@ -28,6 +29,9 @@ _SUMMED = (
 )
 _MASSES = ("mass", "part_mass")
 
+# In the table; the report has all of them.
+_VOIDS_SHOWN = 3
+
 
 @dataclass(frozen=True, slots=True)
 class FillReport:
@@ -42,7 +46,7 @@ class FillReport:
     min_wall : float, optional
         The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a network.
     skin : float, optional
-        In mm.
+        In mm, where it is thinnest.
     solids, faces : int
     valid, closed : bool
         By the kernel's own check; every edge bounds exactly two faces. The bare surface is not closed.
@@ -58,6 +62,9 @@ class FillReport:
         Pieces besides the largest one of each domain, and pieces that were dropped.
     islands_volume, dropped_volume : float
         Of either, in mm3; of the bare surface 0.
+    voids : tuple of SealedVoid
+        Space that the solids enclose and no opening reaches, the largest first, each with its volume in mm3 and its
+        place in mm; the part's own voids are none of them.
     cut_patches, whole_patches : int
         That the part's boundary may cross, and that lie wholly inside.
     by_sections : bool
@@ -108,6 +115,7 @@ class FillReport:
     islands_volume: float
     dropped: int
     dropped_volume: float
+    voids: tuple[SealedVoid, ...]
     cut_patches: int
     whole_patches: int
     by_sections: bool
@@ -138,8 +146,13 @@ class FillReport:
             ("area", f"{self.area:.6g} mm2"),
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
             ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
+            *([("sealed voids", self._voids_shown())] if self.voids else []),
             *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
         ]
+
+    def _voids_shown(self) -> str:
+        shown = "; ".join(map(str, self.voids[:_VOIDS_SHOWN]))
+        return f"{len(self.voids)} that no opening reaches: {shown}{'; ...' * (len(self.voids) > _VOIDS_SHOWN)}"
 
     def __str__(self) -> str:
         return text_table(self.rows())
@@ -172,6 +185,7 @@ def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> 
         by_sections=all(report.by_sections for report in reports),
         shift=next((report.shift for report in reports if any(report.shift)), first.shift),
         seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},
+        voids=tuple(sorted((void for report in reports for void in report.voids), key=lambda void: -void.volume)),
         bodies=len(reports),
         remarks=remarks,
     )

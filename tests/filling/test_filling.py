@@ -10,13 +10,13 @@ import build123d as bd
 import cadquery as cq
 import numpy as np
 import pytest
-from OCP.TopAbs import TopAbs_FACE
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial.transform import Rotation
 
 import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
-from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError
+from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError, SealedVoidsWarning
 from gyroid_cad.filling.fill import Filled, fill
 from gyroid_cad.filling.part import Filling, part_of
 from gyroid_cad.filling.wanted import KINDS
@@ -377,3 +377,47 @@ def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.Mo
     monkeypatch.setattr(gyroid_cad.filling.part, "bounded_solids", lambda *arguments: solids)
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(peg(), CELL, WALL, fit=COARSE)
+
+
+def test_voids_that_a_skin_seals_are_counted_with_place_and_volume_and_warned_of() -> None:
+    with pytest.warns(SealedVoidsWarning, match="4 voids that no opening reaches, the largest"):
+        sealed = fill(cq.Workplane().box(10, 8, 8), CELL, density=0.3, skin=1.0, fit=COARSE)
+    assert len(sealed.report.voids) == 4
+    sealed_volume = sum(void.volume for void in sealed.report.voids)
+    assert sealed_volume == pytest.approx(10 * 8 * 8 - sealed.report.volume, rel=1e-4)
+    assert "sealed voids   4 that no opening reaches: " in str(sealed)
+    assert [void["volume"] for void in sealed.report.as_dict()["voids"]] == [v.volume for v in sealed.report.voids]
+
+
+def test_chips_of_void_in_a_corner_are_closed_and_the_report_holds_the_rest() -> None:
+    with pytest.warns(SealedVoidsWarning, match="2 voids"):
+        sealed = fill(cq.Workplane().box(18, 10, 10), 8, density=0.3, skin=1.0, fit=COARSE)
+    assert measure(sealed.solid()) == pytest.approx((sealed.report.volume, sealed.report.area), rel=1e-6)
+    assert len(list(parts_of(sealed.solid(), TopAbs_SHELL))) == 1 + len(sealed.report.voids)
+
+
+def test_a_core_of_the_users_own_is_filled_and_the_rest_is_skin(tmp_path: Path) -> None:
+    core = cq.Workplane().box(8, 6, 7).translate((0, 0, 0.5))
+    write_step(core.val().wrapped, tmp_path / "inner.step")
+    made = fill(cq.Workplane().box(10, 8, 8), CELL, density=0.3, core=tmp_path / "inner.step", fit=COARSE)
+    assert made.report.skin == pytest.approx(1.0)
+    assert [void.volume < 1.0 for void in made.report.voids] == [True]
+    assert made.report.min_wall < 1.0
+    assert made.report.volume == pytest.approx(10 * 8 * 8 - 0.7 * 8 * 6 * 7, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"skin": 1.0}, "skin = 1.0: expected none beside a core"),
+        ({"openings": [">Z"]}, "openings = ['>Z']: expected none beside a core"),
+        ({"kind": "surface", "density": None}, "expected none round the bare surface"),
+        ({"core": "no solid"}, "no solid could not be read"),
+        ({"core": 3.0}, "core = 3.0: expected a shape"),
+    ],
+)
+def test_what_does_not_go_with_a_core_is_refused(given: dict[str, Any], words: str) -> None:
+    settings = {"density": 0.3, "core": cq.Workplane().box(2, 2, 2), **given}
+    with pytest.raises((ParameterError, ExportError)) as caught:
+        fill(cq.Workplane().box(4, 4, 4), CELL, **settings)
+    assert words in str(caught.value)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import sys
+import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any
+
+from gyroid_cad.common.progress import is_forecast
 
 if TYPE_CHECKING:
     from gyroid_cad.cli.installation import Diagnosis
@@ -48,13 +51,36 @@ def print_doctor(diagnosis: Diagnosis) -> None:
     print_table(None, [*rows, ("verdict", "ok" if diagnosis.ok else "failed", verdict)])
 
 
-def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
-    """A progress display on the terminal while the context lasts, or none."""
+def shown_progress(shown: bool, lines: bool = False) -> AbstractContextManager[Progress | None]:
+    """A progress display on the terminal while the context lasts, or none.
+
+    Parameters
+    ----------
+    shown : bool
+    lines : bool
+        Where the error stream is no terminal, to print a line there as each stage begins.
+    """
     if not shown:
         return nullcontext(None)
+    if lines and not sys.stderr.isatty():
+        return nullcontext(_line_progress(time.perf_counter()))
     from gyroid_cad.cli.bars import terminal_progress
 
     return terminal_progress()
+
+
+def _line_progress(start: float) -> Progress:
+    """A function that prints each stage once, with the seconds since the start, for logs."""
+    said: set[str] = set()
+
+    def update(stage: str, done: int, total: int) -> None:
+        # Of a file that cannot be read one line is said, why.
+        if stage not in said and stage != "read":
+            said.add(stage)
+            expected = f", {total} s" if is_forecast(stage) else ""
+            print(f"{time.perf_counter() - start:7.1f} s  {stage}{expected}", file=sys.stderr, flush=True)
+
+    return update
 
 
 def print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -162,7 +161,7 @@ def fill_command(
     written = {name: given[name] for name in ("schema", "deviation", "angle")}
     require_settings((1, 1, 1), **written)
     checked = None if printer is None else check_by(printer)
-    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
+    with shown_progress(not quiet, lines=True) as progress:
         filled = fill(part, progress=progress, **settings)
         filled.write(*output, **written, progress=progress)
         check = None if checked is None else checked(filled, given["deviation"], progress)

@@ -17,10 +17,11 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
-from gyroid_cad.common.progress import Progress, named_progress, timed
+from gyroid_cad.common.progress import Progress, named_progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.infill import described_infill, require_cover
+from gyroid_cad.filling.forecast import forecast_of
+from gyroid_cad.filling.infill import described_infill
 from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
@@ -268,10 +269,12 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    regions, size, settings, infill_in = described_infill(
+    regions, size, settings, check, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
+    report_progress(progress, "read", 0, 1)
     parts, remarks = parts_of(part, solids)
+    report_progress(progress, "read", 1, 1)
     if core is not None and len(parts) > 1:
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
@@ -279,8 +282,11 @@ def fill(
     made, islands = [], Islands()
     for (name, whole), faces in zip(parts, _opened(parts, openings), strict=True):
         told = progress if len(parts) == 1 else named_progress(progress, name)
-        if lattice is None:
-            require_cover(whole.low, whole.high, size, settings.control_points)
+        forecast = forecast_of(whole, size, settings.control_points)
+        if lattice is None or lattice.grading().cells_alike:
+            forecast.require_memory(size)
+        check(whole)
+        report_progress(told, str(forecast), 0, round(forecast.seconds))
         hollow = _hollow(whole, shell, faces, core)
         inner = whole if hollow is None else hollow.core
         filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)

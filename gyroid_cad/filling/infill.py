@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial as partial_of
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind
-from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
@@ -41,7 +41,7 @@ from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
 from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_cover"]
+__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_thicker"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -50,8 +50,6 @@ Booleans = NDArray[np.bool_]
 _BLOCK_SAMPLES = 13
 # Places of a part that tell what of it a block covers; and how often the block is cut back where its wall would fold.
 _COVER_POINTS, _MOST_CUTS = 2000, 20
-# Peak memory of filling and writing, for each cell of the box round a part, as measured, rounded up.
-_BYTES_PER_CELL = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,6 +133,7 @@ class Infill:
         ]
 
 
+Check = Callable[[Part], None]
 InfillIn = Callable[[Part, Frame, Timed], Infill]
 
 
@@ -148,8 +147,8 @@ def described_infill(
     lattice: Lattice | None,
     surface: MinimalSurface,
     partial: bool = False,
-) -> tuple[tuple[Region, ...], float, FitSettings, InfillIn]:
-    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame.
+) -> tuple[tuple[Region, ...], float, FitSettings, Check, InfillIn]:
+    """The regions wanted, the cell size, the fit, a check of a part, and how the lattice is to be had for one.
 
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
@@ -165,7 +164,9 @@ def described_infill(
         def block(part: Part, frame: Frame, timed: Timed) -> Infill:
             return block_infill(lattice, part, frame, timed, partial)
 
-        return regions.regions, lattice.cell_size, fit, block
+        uniform = lattice.wall_thickness if lattice.uniform else 0.0
+        check = partial_of(require_thicker, wall=uniform, thickness=lattice.thickness, density=lattice.density)
+        return regions.regions, lattice.cell_size, fit, check, block
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
@@ -174,17 +175,33 @@ def described_infill(
 
     def endless(part: Part, frame: Frame, timed: Timed) -> Infill:
         made = endless_infill(part, frame, size, wanted, settings, closeness, timed, surface)
-        smallest = float(np.min(part.high - part.low))
-        if smallest <= made.max_thickness:
-            name, given = ("thickness", thickness) if density is None else ("density", density)
-            raise ParameterError(
-                name,
-                given,
-                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
-            )
+        require_thicker(part, made.max_thickness, thickness, density)
         return made
 
-    return wanted.regions, size, settings, endless
+    uniform = wanted.thickness if isinstance(wanted.thickness, float) else 0.0
+    check = partial_of(require_thicker, wall=uniform, thickness=thickness, density=density)
+    return wanted.regions, size, settings, check, endless
+
+
+def require_thicker(part: Part, wall: float, thickness: FieldLike | None, density: FieldLike | None) -> None:
+    """Check that a part is somewhere thicker than the wall that is to fill it.
+
+    Parameters
+    ----------
+    part : Part
+    wall : float
+        Whole wall where it is thickest, in mm; 0 where that is not known yet.
+    thickness, density : number or field, optional
+        As the user gave it.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if wall and (thickest := part.thickest(wall)) <= wall:
+        name, given = ("thickness", thickness) if density is None else ("density", density)
+        accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
+        raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def endless_infill(
@@ -234,32 +251,6 @@ def endless_infill(
     if refit is not None:
         min_thickness, max_thickness = min(min_thickness, refit.min_thickness), max(max_thickness, refit.max_thickness)
     return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
-
-
-def require_cover(low: Floats, high: Floats, cell_size: float, control_points: int) -> None:
-    """Check that there is memory for the cells that cover a part, before any of them is made.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (3,)
-        Corners of the box round the part, in mm.
-    cell_size : float
-        In mm.
-    control_points : int
-        Of a patch, along a side.
-
-    Raises
-    ------
-    ParameterError
-        Saying how many cells that would be, and which size would do.
-    """
-    count = float(np.prod(np.maximum((high - low) / cell_size, 1)))
-    each = _BYTES_PER_CELL * max(1.0, (control_points / 10) ** 2)
-
-    def accepted(left: int) -> str:
-        return f"at least about {cell_size * (count * each / max(left, each)) ** (1 / 3):.3g} mm for this part"
-
-    require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
 
 
 def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, partial: bool = False) -> Infill:

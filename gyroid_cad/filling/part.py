@@ -133,9 +133,17 @@ class Filling:
             # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
             attempts = [(phase, True, None) for phase in PERTURBATIONS] + attempts
         return first_success(
-            partial(self._filled, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
-            for phase, by_sections, processes in attempts
+            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
+            for number, (phase, by_sections, processes) in enumerate(attempts, 1)
         )
+
+    def _attempt(self, number: int, *given: Any) -> Outcome:
+        """Fill, and announce it where it fails: another attempt takes as long again."""
+        try:
+            return self._filled(*given)
+        except KernelError as failed:
+            report_progress(self.progress, f"attempt {number} failed, the next one follows: {failed}", 1, 1)
+            raise
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)

@@ -48,6 +48,9 @@ _ANGULAR_DEFLECTION = 0.5
 # beyond its deflection here and there: within so many times it the kernel is asked.
 _INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
+# Where the thickness is looked at: at so many places at most, so many along the largest extent, by balls of which each
+# has so much of the last; and how near the next face they may come, in parts of their radius.
+_THICKNESS_PLACES, _THICKNESS_STEPS, _SMALLER, _AS_DEEP = 1500, 60, 0.9, 0.98
 # Of a part that takes up little of its box fewer points are found than are asked for.
 _MOST_BATCHES = 8
 _BOX_FACES, _BOX_CORNERS = 6, 8
@@ -70,6 +73,8 @@ class Part:
         In mm3.
     box : Box, optional
         If the part is one solid and that is a box.
+    area : float
+        Of the boundary, in mm2.
     """
 
     shape: TopoDS_Shape
@@ -78,6 +83,7 @@ class Part:
     high: Floats
     volume: float
     box: Box | None = None
+    area: float = 0.0
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,).
@@ -128,6 +134,28 @@ class Part:
                 break
         return found[:count]
 
+    def thickest(self, enough: float) -> float:
+        """About how thick the part is where it is thickest, in mm: the largest ball that fits into it.
+
+        Parameters
+        ----------
+        enough : float
+            A part that is thicker than this somewhere need not be known better.
+        """
+        smallest = float(np.min(self.high - self.low))
+        if self.box is not None or smallest <= enough:
+            return smallest
+        points, normals, _ = self.surface_samples(float(np.max(self.high - self.low)) / _THICKNESS_STEPS)
+        chosen = np.random.default_rng(0).permutation(len(points))[:_THICKNESS_PLACES]
+        points, normals = points[chosen], normals[chosen]
+        signed, band = self._signed_distances
+        if signed is None:
+            return smallest
+        radius = enough / 2 / _AS_DEEP
+        while not np.any(signed(points - radius * normals) <= band - _AS_DEEP * radius):
+            radius *= _SMALLER
+        return 2 * radius
+
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
 
@@ -167,10 +195,10 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
         if fault := fault_of(solid, "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"):
             raise ParameterError(parameter, kind, fault)
     low, high = bounding_box(shape)
-    volume = sum(measure(solid)[0] for solid in solids)
+    volume, area = (sum(sizes) for sizes in zip(*map(measure, solids), strict=True))
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, low, high, volume, _box_of(solids))
+    return Part(divided, solids, low, high, volume, _box_of(solids), area)
 
 
 def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:

@@ -22,7 +22,7 @@ from gyroid_cad.errors import KernelError, ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.forecast import forecast_of
 from gyroid_cad.filling.infill import described_infill
-from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
+from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
@@ -273,7 +273,7 @@ def fill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
     report_progress(progress, "read", 0, 1)
-    parts, remarks = parts_of(part, solids)
+    parts, remarks = bodies_of(part, solids)
     report_progress(progress, "read", 1, 1)
     if core is not None and len(parts) > 1:
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")

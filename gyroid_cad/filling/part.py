@@ -32,7 +32,7 @@ from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "part_of", "parts_of", "without_islands", "without_specks"]
+__all__ = ["Filling", "Made", "Outcome", "bodies_of", "part_of", "without_islands", "without_specks"]
 
 Floats = NDArray[np.float64]
 
@@ -317,7 +317,7 @@ def _without(made: Made, shells: Sequence[KernelShape]) -> Made:
     return Made(without_shells(made.shape, shells), made.volume + volume, made.area - area)
 
 
-def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
+def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
     """The closed, valid solids of whatever a user gives as a part, each by itself; those that overlap are united.
 
     Parameters
@@ -348,7 +348,7 @@ def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[s
 
 def part_of(given: Any) -> Part:
     """The same as one part."""
-    parts, _ = parts_of(given)
+    parts, _ = bodies_of(given)
     return parts[0][1] if len(parts) == 1 else require_part(compound_of(part.shape for _, part in parts))
 
 

@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from gyroid_cad.common.tables import Rows
     from gyroid_cad.printing.verdict import PrintCheck
 
-__all__ = ["print_check_table", "print_doctor", "print_report", "print_table", "shown_progress"]
+__all__ = ["SILENT_SECONDS", "print_check_table", "print_doctor", "print_report", "print_table", "shown_progress"]
 
 Progress = Callable[[str, int, int], None]
 
+# Of a command whose stages are printed: what takes no longer is told by its result alone.
+SILENT_SECONDS = 5.0
 # Columns of a pipe, which has none.
 _UNWRAPPED = 100_000
 
@@ -58,7 +60,7 @@ def shown_progress(shown: bool, lines: bool = False) -> AbstractContextManager[P
     ----------
     shown : bool
     lines : bool
-        Where the error stream is no terminal, to print a line there as each stage begins.
+        Where the error stream is no terminal, to print a line there for each stage of what takes long.
     """
     if not shown:
         return nullcontext(None)
@@ -70,15 +72,21 @@ def shown_progress(shown: bool, lines: bool = False) -> AbstractContextManager[P
 
 
 def _line_progress(start: float) -> Progress:
-    """A function that prints each stage once, with the seconds since the start, for logs."""
+    """A function that prints each stage once, with the seconds since the start, for logs.
+
+    Nothing is printed of what ends, or is refused, within :data:`SILENT_SECONDS`.
+    """
     said: set[str] = set()
+    held: list[str] = []
 
     def update(stage: str, done: int, total: int) -> None:
-        # Of a file that cannot be read one line is said, why.
-        if stage not in said and stage != "read":
+        seconds = time.perf_counter() - start
+        if stage not in said:
             said.add(stage)
-            expected = f", {total} s" if is_forecast(stage) else ""
-            print(f"{time.perf_counter() - start:7.1f} s  {stage}{expected}", file=sys.stderr, flush=True)
+            held.append(f"{seconds:7.1f} s  {stage}{f', {total} s' if is_forecast(stage) else ''}")
+        if seconds >= SILENT_SECONDS and held:
+            print(*held, sep="\n", file=sys.stderr, flush=True)
+            held.clear()
 
     return update
 

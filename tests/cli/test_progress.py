@@ -120,9 +120,12 @@ def test_fill_forecasts_what_it_takes_before_it_begins_and_prints_a_line_a_stage
     cadquery.exporters.export(cadquery.Workplane().box(4, 4, 4), str(part))
     command = ["fill", str(part), "-o", str(filled), "--cell-size", "8", "--density", "0.3", "--control-points", "5"]
     monkeypatch.setattr(cli_fill, "shown_progress", shown_progress)
+    # What takes no longer than this is not told of.
+    monkeypatch.setattr("gyroid_cad.cli.console.SILENT_SECONDS", 0.0)
     assert main(command) == 0
     lines = [line.split(" s  ", 1) for line in capsys.readouterr().err.splitlines()]
     stages = [stage for _, stage in lines]
+    assert stages.pop(0) == "read"
     assert re.fullmatch(r"about \d+ crossings, \d+ faces, .* GB of memory, .* MB of STEP, \d+ s", stages[0])
     assert stages == list(dict.fromkeys(stages))
     assert stages[-1] == "write a.brep"

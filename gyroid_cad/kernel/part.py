@@ -36,7 +36,7 @@ from gyroid_cad.mesh.triangles.files import numbered_corners
 from gyroid_cad.mesh.triangles.measures import SignedDistances, unmatched_edges
 from gyroid_cad.trim.box import Box
 
-__all__ = ["Part", "measure", "require_part", "selected_faces"]
+__all__ = ["Part", "measure", "require_part", "selected_faces", "triangles_of"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -135,6 +135,14 @@ class Part:
         clouds = [_spread(*triangles, spacing) for triangles in self._meshed(deflection)]
         points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
         return points, normals, spacing + deflection
+
+
+def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
+    """Corners of triangles no further from a shape's faces than a deflection in mm; shape (triangles, 3, 3)."""
+    copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
+    # In one thread, so that a process may be forked from this one.
+    BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
+    return np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(copy))])
 
 
 def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -189,6 +189,7 @@ def fill(
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
     solids: Sequence[str | int] = (),
+    partial: bool = False,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -230,13 +231,16 @@ def fill(
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
+        size, thickness, density and surface are its own. It is placed by its own origin and rotation first. Cells are
+        added round it until it covers the part, as far as its fields and its map go on.
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
     solids : sequence of str or int
         Which of the part's solids are filled: names that its file or assembly gives them, or numbers from 1. All of
         them if left out.
+    partial : bool
+        Fill what the given lattice reaches, even if that is not all of the part; the report says how much it is not.
 
     Returns
     -------
@@ -265,7 +269,7 @@ def fill(
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     regions, size, settings, infill_in = described_infill(
-        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
+        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
     parts, remarks = parts_of(part, solids)
     if core is not None and len(parts) > 1:
@@ -279,7 +283,7 @@ def fill(
             require_cover(whole.low, whole.high, size, settings.control_points)
         hollow = _hollow(whole, shell, faces, core)
         inner = whole if hollow is None else hollow.core
-        filling = Filling(whole, hollow, regions, partial(infill_in, inner), size, told)
+        filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
         with _naming(name if len(parts) > 1 else ""):
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
@@ -289,6 +293,8 @@ def fill(
     islands.warn("drop_islands drops")
     together = _together(made, remarks)
     warn_of_voids(together.report.voids)
+    if together.report.uncovered:
+        warn_caller(f"{100 * together.report.uncovered:.3g} % of the part is out of the lattice's reach", PartWarning)
     return together
 
 
@@ -377,5 +383,6 @@ def _reported(
         shift=(x, y, z),
         seconds=dict(filling.seconds),
         cells_alike=outcome.infill.grading.cells_alike,
+        uncovered=outcome.infill.uncovered,
     )
     return Filled(shapes, report)

@@ -75,6 +75,8 @@ class FillReport:
         By stage.
     cells_alike : bool
         False where a scale field or a map makes cells of other sizes.
+    uncovered : float
+        Share of the part that the given lattice does not reach.
     bodies : int
         Solids of the part, each of which was filled by itself.
     remarks : tuple of str
@@ -120,6 +122,7 @@ class FillReport:
     shift: Point
     seconds: dict[str, float]
     cells_alike: bool
+    uncovered: float = 0.0
     bodies: int = 1
     remarks: tuple[str, ...] = ()
 
@@ -136,6 +139,7 @@ class FillReport:
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
             *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
             *([] if self.bodies == 1 else [("bodies", f"{self.bodies}, each filled by itself")]),
+            *([("uncovered", f"{100 * self.uncovered:.3g} % of the part")] if self.uncovered else []),
             *(("part", remark) for remark in self.remarks),
             ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
@@ -177,6 +181,7 @@ def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> 
         thickness=max(report.thickness for report in reports),
         min_wall=min((report.min_wall for report in reports if report.min_wall is not None), default=None),
         density=sums["volume"] / sums["part_volume"],
+        uncovered=sum(report.uncovered * report.part_volume for report in reports) / sums["part_volume"],
         by_sections=all(report.by_sections for report in reports),
         shift=next((report.shift for report in reports if any(report.shift)), first.shift),
         seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},

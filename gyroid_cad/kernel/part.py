@@ -48,6 +48,8 @@ _ANGULAR_DEFLECTION = 0.5
 # beyond its deflection here and there: within so many times it the kernel is asked.
 _INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
+# Of a part that takes up little of its box fewer points are found than are asked for.
+_MOST_BATCHES = 8
 _BOX_FACES, _BOX_CORNERS = 6, 8
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
@@ -115,6 +117,16 @@ class Part:
         copy = BRepBuilderAPI_Copy(self.shape, False, False).Shape()
         BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, True)
         return _triangles(copy)
+
+    def points_inside(self, count: int) -> Floats:
+        """Points spread at random over the inside, the same ones each time; shape (n, 3), as many as are wanted."""
+        random, found = np.random.default_rng(0), np.empty((0, 3))
+        for _ in range(_MOST_BATCHES):
+            points = random.uniform(self.low, self.high, (count, 3))
+            found = np.concatenate([found, points[self.contains(points)]])
+            if len(found) >= count:
+                break
+        return found[:count]
 
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.

@@ -14,16 +14,16 @@ from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_Context
-from OCP.TopAbs import TopAbs_FACE, TopAbs_OUT, TopAbs_State
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_OUT, TopAbs_State
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
-from gyroid_cad.kernel.part import Part, triangles_of
+from gyroid_cad.kernel.part import triangles_of
 from gyroid_cad.kernel.split import inner_point
 from gyroid_cad.mesh.triangles.files import numbered_corners
-from gyroid_cad.mesh.triangles.measures import SignedDistances
+from gyroid_cad.mesh.triangles.measures import SignedDistances, unmatched_edges
 
 __all__ = ["Depths", "FaceDistances", "NearDistances", "points_on"]
 
@@ -116,12 +116,12 @@ class Depths:
     """
 
     def __init__(self, solid: TopoDS_Solid, openings: Sequence[TopoDS_Face]) -> None:
-        self._solid, self._openings = solid, list(openings)
+        self._openings = list(openings)
         faces = parts_of(solid, TopAbs_FACE)
         self.kept = FaceDistances(face for face in faces if not any(face.IsSame(opening) for opening in openings))
         self.opened = FaceDistances(openings)
         self._random = np.random.default_rng(0)
-        self._part = _whole(solid)
+        self._solid = _Inside(solid)
         self._near: dict[float, NearDistances] = {}
 
     def _depths(self, points: Floats, level: float) -> Floats:
@@ -140,7 +140,7 @@ class Depths:
             best = np.argsort(depths)[-_FOLLOWED:]
             steps = self._random.normal(size=(_TRIES, len(best), 3)) * (reach * depths[best])[:, np.newaxis]
             tried = (points[best] + steps).reshape(-1, 3)
-            tried = tried[self._part.contains(tried)]
+            tried = tried[self._solid.contains(tried)]
             points = np.concatenate([points[best], tried])
             depths = np.concatenate([depths[best], self._depths(tried, enough)])
         return float(depths.max(initial=0.0))
@@ -152,7 +152,7 @@ class Depths:
         least, most = _THINNEST * skin, _THICKEST * skin
         depths, boundary = self._depths(self._inside, least), self._depths(self._inside, most)
         outside, inside = depths < least, boundary > most
-        in_core = np.any([_whole(one).contains(self._inside) for one in core], axis=0)
+        in_core = np.any([_Inside(one).contains(self._inside) for one in core], axis=0)
         if np.any(in_core[outside]) or not np.all(in_core[inside]):
             return False
         states = [BRepClass3d_SolidClassifier(one) for one in core]
@@ -170,24 +170,38 @@ class Depths:
         if np.any(depths < _THINNEST * skin):
             return False
         below = points[[self.opened.distance(point) > _ON_OPENING * skin for point in points]]
-        return bool(np.all(self._depths(below, skin) <= _THICKEST * skin) and np.all(self._part.contains(below)))
+        return bool(np.all(self._depths(below, skin) <= _THICKEST * skin) and np.all(self._solid.contains(below)))
 
     @cached_property
     def _inside(self) -> Floats:
         """Points all over the solid, shape (n, 3)."""
         found: list[Floats] = []
         for _ in range(_BATCHES):
-            points = self._random.uniform(self._part.low, self._part.high, (_POINTS_INSIDE, 3))
-            found.append(points[self._part.contains(points)])
+            points = self._random.uniform(self._solid.low, self._solid.high, (_POINTS_INSIDE, 3))
+            found.append(points[self._solid.contains(points)])
             if sum(map(len, found)) >= _POINTS_INSIDE:
                 break
         return np.concatenate(found)[:_POINTS_INSIDE]
 
 
-def _whole(solid: TopoDS_Solid) -> Part:
-    """A solid by itself, whose volume nobody asks."""
-    low, high = corners_of(box_round([solid]))
-    return Part(solid, (solid,), low, high, volume=0.0)
+class _Inside:
+    """Tell which points lie in a solid: triangles tell, and the kernel of those that are near its boundary."""
+
+    def __init__(self, solid: TopoDS_Solid) -> None:
+        self.low, self.high = corners_of(box_round([solid]))
+        self._classifier = BRepClass3d_SolidClassifier(solid)
+        deflection = _COARSE * float((self.high - self.low).max())
+        vertices, triangles, _ = numbered_corners(triangles_of(solid, deflection))
+        self._band = _BAND * deflection if not unmatched_edges(triangles) else np.inf
+        self._distances = SignedDistances(vertices, triangles)
+
+    def contains(self, points: Floats) -> NDArray[np.bool_]:
+        """Mask of the points, shape (n, 3), that lie inside; shape (n,)."""
+        distances = self._distances(points)
+        inside = distances < 0
+        for index in np.flatnonzero(np.abs(distances) < self._band).tolist():
+            inside[index] = _state(self._classifier, points[index]) == TopAbs_IN
+        return np.asarray(inside)
 
 
 def points_on(face: TopoDS_Face, count: int) -> Floats:

@@ -146,7 +146,7 @@ moves = st.tuples(*3 * [st.floats(-2.0, 2.0)])
 
 
 @given(bodies, bodies, turns, moves, st.booleans(), st.floats(0.1, 0.5))
-@settings(max_examples=3, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=2, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_a_random_part_has_a_skin_or_is_refused_with_a_reason(
     one: bd.Part, other: bd.Part, turn: Sequence[float], move: Sequence[float], joined: bool, skin: float
 ) -> None:

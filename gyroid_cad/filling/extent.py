@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -10,7 +12,7 @@ from gyroid_cad.kernel.part import Part
 from gyroid_cad.wall.covering import BoxExtent, Frame, PlacedExtent
 from gyroid_cad.wall.grading import Extent
 
-__all__ = ["PartExtent", "extent_of"]
+__all__ = ["BoundedExtent", "PartExtent", "extent_of"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -49,8 +51,20 @@ class PartExtent:
         return found
 
 
-def extent_of(part: Part, cell_size: float) -> Extent:
-    """The space that a part takes up: a box is known at once, anything else by points on its boundary."""
+class BoundedExtent(Extent, Protocol):
+    """Space to be filled that answers for itself, with the corners of the box round it in mm."""
+
+    @property
+    def low(self) -> Floats: ...
+
+    @property
+    def high(self) -> Floats: ...
+
+
+def extent_of(part: Part | BoundedExtent, cell_size: float) -> Extent:
+    """The space that a part takes up: a box is known at once, any other solid by points on its boundary."""
+    if not isinstance(part, Part):
+        return part
     if part.box is not None:
         low, high = (tuple(corner.tolist()) for corner in (part.box.low, part.box.high))
         return PlacedExtent(BoxExtent(low, high), Frame(np.zeros(3), part.box.axes.T))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import Kind, Schema, SurfaceName
+from gyroid_cad.common.choices import ROUTES, Kind, Route, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
-from gyroid_cad.common.progress import Progress, timed
+from gyroid_cad.common.progress import Progress, Timed, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.infill import Infill, block_infill, endless_infill, require_cover
+from gyroid_cad.filling.extent import BoundedExtent
+from gyroid_cad.filling.infill import Infill, InfillIn, block_infill, endless_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
 from gyroid_cad.filling.report import FillReport
+from gyroid_cad.filling.triangle_part import naming_triangles
+from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, grams_of, regions_of, skin_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
@@ -186,6 +189,8 @@ def fill(
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
+    route: Route = "brep",
+    deviation: float | None = None,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -226,6 +231,11 @@ def fill(
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
+    route : {"brep", "triangles"}
+        Through exact solids; or through triangles alone, from and to what is printed: an STL, 3MF, OBJ or PLY file may
+        be the part, no solid is built, and a :class:`~gyroid_cad.filling.triangles.FilledTriangles` comes out.
+    deviation : float, optional
+        Of the triangles of that route, in mm; at the other, :meth:`Filled.write` takes it.
 
     Returns
     -------
@@ -257,23 +267,34 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
+    if route not in ROUTES:
+        raise ParameterError("route", route, " or ".join(ROUTES))
     regions, size, settings, infill_in = _described(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
     )
+    if route == TRIANGLES and shell is not None:
+        raise ParameterError("skin", skin, "none at route triangles")
+    if route == TRIANGLES:
+        cover = partial(require_cover, cell_size=size, control_points=settings.control_points)
+        covered = cover if lattice is None else None
+        skinned = (shell, openings, deviation)
+        job = TriangleJob(kind, size, regions, infill_in, covered, frame, *skinned, rule, grams, progress)
+        # A class of its own, which has all of Filled that needs no B-rep.
+        return job.filled(part)  # type: ignore[return-value]
+    if deviation is not None:
+        raise ParameterError("deviation", deviation, "none at route brep, whose solids write(deviation=...) meshes")
     whole = part_of(part)
     if lattice is None:
         require_cover(whole.low, whole.high, size, settings.control_points)
-    hollow = None if shell is None else hollowed(whole, shell, selected_faces(whole, openings))
-    core = whole if hollow is None else hollow.core
-    filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
-    outcome = filling.run(frame)
+    with naming_triangles(kind):
+        hollow = None if shell is None else hollowed(whole, shell, selected_faces(whole, openings))
+        core = whole if hollow is None else hollow.core
+        filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
+        outcome = filling.run(frame)
     domains, islands = without_islands(outcome.domains, filling.cells, rule)
     made = _reported(filling, replace(outcome, domains=domains), islands, kind, shell, grams)
     islands.warn("drop_islands drops")
     return made
-
-
-_InfillIn = Callable[["Part", Frame, Callable[[str], AbstractContextManager[None]]], Infill]
 
 
 def _described(
@@ -285,7 +306,7 @@ def _described(
     tolerance: float | None,
     lattice: Lattice | None,
     surface: MinimalSurface,
-) -> tuple[tuple[Region, ...], float, FitSettings, _InfillIn]:
+) -> tuple[tuple[Region, ...], float, FitSettings, InfillIn]:
     """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame."""
     if lattice is not None:
         given = {"cell_size": cell_size, "thickness": thickness, "density": density, "tolerance": tolerance}
@@ -295,15 +316,16 @@ def _described(
         if kind != SHEET:
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
         regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
-        return regions.regions, lattice.cell_size, fit, lambda part, frame, timed: block_infill(lattice, frame)
+        block: InfillIn = lambda part, frame, timed, least=0.0: block_infill(lattice, frame)  # noqa: E731
+        return regions.regions, lattice.cell_size, fit, block
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
     settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
     closeness = tolerance or USUAL_TOLERANCE
 
-    def endless(part: Part, frame: Frame, timed: Callable[[str], AbstractContextManager[None]]) -> Infill:
-        made = endless_infill(part, frame, size, wanted, settings, closeness, timed, surface)
+    def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
+        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
             name, given = ("thickness", thickness) if density is None else ("density", density)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import SelfIntersectionError
 from gyroid_cad.fields.field import Field
-from gyroid_cad.filling.extent import extent_of
+from gyroid_cad.filling.extent import BoundedExtent, extent_of
 from gyroid_cad.filling.wanted import Region, Regions
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -35,7 +35,7 @@ from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Infill", "block_infill", "endless_infill", "require_cover"]
+__all__ = ["Infill", "InfillIn", "block_infill", "endless_infill", "require_cover"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -124,8 +124,14 @@ class Infill:
         ]
 
 
+class InfillIn(Protocol):
+    """Gives the lattice for a part and a frame, each stage timed, with a uniform wall of so many mm at least."""
+
+    def __call__(self, part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill: ...
+
+
 def endless_infill(
-    part: Part,
+    part: Part | BoundedExtent,
     frame: Frame,
     cell_size: float,
     regions: Regions,
@@ -138,7 +144,7 @@ def endless_infill(
 
     Parameters
     ----------
-    part : Part
+    part : Part or BoundedExtent
     frame : Frame
     cell_size : float
         In mm.
@@ -161,7 +167,7 @@ def endless_infill(
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
-            if not grading.uniform:
+            if not (grading.uniform and isinstance(part, Part)):
                 grading = replace(grading, extent=PlacedExtent(extent_of(part, cell_size), frame))
             min_thickness, max_thickness = wall_extremes(low, high, frame, grading)
             complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface, grading.extent)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.extent import PartExtent
@@ -30,7 +31,7 @@ from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "part_of", "without_islands"]
+__all__ = ["Filling", "Made", "Outcome", "part_of", "shape_of", "without_islands"]
 
 Floats = NDArray[np.float64]
 
@@ -288,17 +289,23 @@ def part_of(given: Any) -> Part:
     ExportError
         If a file is neither STEP nor BREP, or holds no shape.
     """
+    return require_part(shape_of(given))
 
+
+def shape_of(given: Any) -> KernelShape:
+    """The kernel's shape of whatever a user gives as a part, as :func:`part_of` takes it; unchecked."""
     if isinstance(given, str | os.PathLike):
-        return require_part(read_shape(given))
+        if format_of(given) in TRIANGLE_FORMATS:
+            raise ParameterError("part", str(given), 'a STEP or BREP file; triangles are filled by route="triangles"')
+        return read_shape(given)
     if hasattr(given, "vals"):
-        return require_part(compound_of(shape.wrapped for shape in given.vals()))
+        return compound_of(shape.wrapped for shape in given.vals())
     shape = getattr(given, "wrapped", given)
     if not hasattr(shape, "ShapeType"):
         raise ParameterError(
             "part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, a STEP or BREP file"
         )
-    return require_part(shape)
+    return shape
 
 
 def _size(made: Made) -> float:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.choices import Kind
+from gyroid_cad.common.choices import Kind, Route
 from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
 
 __all__ = ["FillReport"]
@@ -51,6 +51,12 @@ class FillReport:
         By stage.
     cells_alike : bool
         False where a scale field or a map makes cells of other sizes.
+    route : {"brep", "triangles"}
+        At the latter ``faces`` counts triangles, and patches are not told apart by the part's boundary.
+    deviation : float, optional
+        Of triangles from the lattice and the part, in mm, at that route.
+    repairs : tuple of str
+        That the part's triangles needed.
 
     Examples
     --------
@@ -91,6 +97,9 @@ class FillReport:
     shift: Point
     seconds: dict[str, float]
     cells_alike: bool
+    route: Route = "brep"
+    deviation: float | None = None
+    repairs: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -98,19 +107,26 @@ class FillReport:
 
     def rows(self) -> Rows:
         """Subject and finding, line by line, as they are printed."""
-        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
         of_part = f"{self.part_volume:.8g}, density {self.density:.5f}"
         return [
             ("kind", f"{self.kind}, {cell_shown(self.cell_size, self.cells_alike)}, wall {self.thickness:.6g} mm"),
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
             *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
-            ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
+            self._counted(),
+            *[("repaired", repair) for repair in self.repairs],
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
             ("area", f"{self.area:.6g} mm2"),
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
             ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
             *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
         ]
+
+    def _counted(self) -> tuple[str, str]:
+        if self.route == "triangles":
+            within = f"closed, within {self.deviation:.3g} mm; no B-rep was made"
+            return "solids, triangles", f"{self.solids}, {self.faces:,} ({within})"
+        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
+        return "solids, faces", f"{self.solids}, {self.faces} ({state})"
 
     def __str__(self) -> str:
         return text_table(self.rows())

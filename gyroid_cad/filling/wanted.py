@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,11 @@ class Regions:
     def uniform(self) -> bool:
         """True where the wall is the same everywhere."""
         return not isinstance(self.thickness, Field | None)
+
+    def at_least(self, thickness: float) -> Regions:
+        """The same regions, a uniform wall of so many mm where theirs is thinner."""
+        thin = isinstance(self.thickness, float) and self.thickness < thickness
+        return replace(self, thickness=thickness) if thin else self
 
 
 def regions_of(

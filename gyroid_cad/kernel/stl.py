@@ -35,12 +35,12 @@ from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.triangulation import parting
 
-__all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
+__all__ = ["FINER", "closed_triangles", "diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
 
 # Parts of the deviation that are tried one after the other, until the mesh is closed.
-_FINER = (1.0, 0.5, 0.2, 0.05)
+FINER = (1.0, 0.5, 0.2, 0.05)
 
 
 def write_meshed_stl(
@@ -68,7 +68,7 @@ def write_meshed_stl(
     ParameterError, ExportError
     """
     with replacing(path) as temporary:
-        for finer in _FINER:
+        for finer in FINER:
             _write(_meshed_copy(shape, path, deviation * finer, angle), temporary, path)
             _, triangles, kept = numbered_corners(binary_stl_corners(temporary))
             if not unmatched_edges(triangles):
@@ -87,7 +87,7 @@ def closed_triangles(
     ------
     ParameterError, ExportError
     """
-    for finer in _FINER:
+    for finer in FINER:
         vertices, triangles = meshed(shape, path, deviation * finer, angle)
         if not unmatched_edges(triangles):
             return vertices, triangles

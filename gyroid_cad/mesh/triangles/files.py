@@ -1,9 +1,10 @@
-"""Triangles read from STL and 3MF files, in millimetres."""
+"""Triangles read from STL, 3MF, OBJ and PLY files, in millimetres."""
 
 from __future__ import annotations
 
 import os
 import zlib
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import BadZipFile, ZipFile
@@ -12,30 +13,38 @@ import lib3mf
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, require_format
+from gyroid_cad.common.formats import OBJ, STL, THREE_MF, TRIANGLE_FORMATS, Format, require_format
 from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles"]
+__all__ = ["STL_RECORD", "binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 Real = TypeVar("Real", np.float32, np.float64)
 
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-_HEADER_BYTES = 84
+STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+STL_HEADER_BYTES = 84
 # Of 3MF, in bytes: 1 GB of it holds about fifteen million triangles, and text of numbers packs ten times or so.
 _MOST_UNPACKED, _MOST_PER_BYTE, _LEAST_ALLOWED = 1_000_000_000, 100, 10_000_000
-_EXPECTED = "a file of triangles, binary or text STL, or 3MF"
+# As meshio names them.
+_POLYGONS = ("triangle", "quad", "polygon")
+_EXPECTED = "a file of triangles, binary or text STL, 3MF, OBJ or PLY"
 
 
-def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
-    """The triangles of an STL or 3MF file.
+def read_triangles(path: str | os.PathLike[str], form: Format | None = None) -> tuple[Floats, Integers]:
+    """The triangles of an STL, 3MF, OBJ or PLY file.
 
-    STL has no unit: its numbers are taken for millimetres, as printers' programs do. 3MF says its own, and where the
-    parts on its build platform stand. Corners of STL's triangles are one where their numbers are the same to the
-    last bit; triangles without area, which bound nothing, are left out.
+    STL, OBJ and PLY have no unit: their numbers are taken for millimetres, as printers' programs do. 3MF says its own,
+    and where the parts on its build platform stand. Corners are one where their numbers are the same to the last bit;
+    triangles without area, which bound nothing, are left out.
+
+    Parameters
+    ----------
+    path : path-like
+    form : Format, optional
+        Whatever the file's name ends in.
 
     Returns
     -------
@@ -49,10 +58,15 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
         If the file cannot be read, or holds no triangles.
     """
     target = Path(path)
-    form = require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
+    form = form or require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
     if reason := unreadable(path):
         raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {reason}")
-    vertices, triangles = _read_3mf(target) if form is THREE_MF else numbered_corners(_stl_corners(target))[:2]
+    if form is THREE_MF:
+        vertices, triangles = _read_3mf(target)
+    elif form is STL:
+        vertices, triangles, _ = numbered_corners(_stl_corners(target))
+    else:
+        vertices, triangles = _read_with_meshio(target, "obj" if form is OBJ else "ply")
     if not len(triangles) or not np.isfinite(vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
     return vertices, triangles
@@ -61,15 +75,15 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
 def _stl_corners(path: Path) -> Floats:
     """Three corners of every triangle; shape (triangles, 3, 3)."""
     size = path.stat().st_size
-    if size >= _HEADER_BYTES:
-        count = int(np.fromfile(path, "<u4", 1, offset=_HEADER_BYTES - 4)[0])
+    if size >= STL_HEADER_BYTES:
+        count = int(np.fromfile(path, "<u4", 1, offset=STL_HEADER_BYTES - 4)[0])
         # Some programs begin binary files with "solid" too: the size tells them from text for certain.
-        if size == _HEADER_BYTES + count * _RECORD.itemsize:
+        if size == STL_HEADER_BYTES + count * STL_RECORD.itemsize:
             return binary_stl_corners(path).astype(float)
     try:
         with path.open("rb") as file:
             # What holds no text is not read as a whole, however large it is.
-            if not file.read(_HEADER_BYTES).lstrip().lower().startswith(b"solid"):
+            if not file.read(STL_HEADER_BYTES).lstrip().lower().startswith(b"solid"):
                 raise ValueError
         lines = path.read_text(encoding="ascii").split("\n")
         corners = [line.split()[1:] for line in lines if line.lstrip().startswith("vertex")]
@@ -80,13 +94,14 @@ def _stl_corners(path: Path) -> Floats:
 
 def binary_stl_corners(path: Path) -> NDArray[np.float32]:
     """Read the corners of all triangles of a binary STL file; shape (triangles, 3, 3)."""
-    return np.asarray(np.fromfile(path, _RECORD, offset=_HEADER_BYTES)["corners"])
+    return np.asarray(np.fromfile(path, STL_RECORD, offset=STL_HEADER_BYTES)["corners"])
 
 
 def keep_facets(path: Path, kept: Booleans) -> None:
     """Rewrite a binary STL file without the triangles that a mask, shape (triangles,), leaves out."""
     if not kept.all():
-        header, records = path.read_bytes()[: _HEADER_BYTES - 4], np.fromfile(path, _RECORD, offset=_HEADER_BYTES)[kept]
+        header = path.read_bytes()[: STL_HEADER_BYTES - 4]
+        records = np.fromfile(path, STL_RECORD, offset=STL_HEADER_BYTES)[kept]
         path.write_bytes(header + len(records).to_bytes(4, "little") + records.tobytes())
 
 
@@ -106,11 +121,56 @@ def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, B
     """
     # Minus zero is zero.
     flat = np.ascontiguousarray(corners.reshape(-1, 3) + corners.dtype.type(0))
-    keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
-    _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
-    triangles = numbers.reshape(-1, 3).astype(np.int64)
+    first, numbers = _distinct(flat)
+    triangles = numbers.reshape(-1, 3)
     kept = np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)
     return flat[first], triangles[kept], kept
+
+
+# Odd numbers of 64 bits without a pattern, by which the bits of coordinates are mixed.
+_MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+
+
+def _distinct(flat: NDArray[Real]) -> tuple[Integers, Integers]:
+    """Places where each distinct point is found first, and the number of every point among these.
+
+    Points are sorted by a mixture of their bits, a single number, which takes a fifth of the time; should two points
+    have one by chance, by all of their bits.
+    """
+    bits = flat.view(np.uint32 if flat.itemsize == 4 else np.uint64).astype(np.uint64)
+    mixed = np.zeros(len(flat), dtype=np.uint64)
+    for axis in range(3):
+        mixed ^= bits[:, axis]
+        mixed *= _MIXERS[axis]
+        mixed ^= mixed >> np.uint64(29)
+    _, first, numbers = np.unique(mixed, return_index=True, return_inverse=True)
+    if not np.array_equal(flat[first][numbers], flat):
+        keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
+        _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
+    return first, numbers.ravel().astype(np.int64)
+
+
+def _read_with_meshio(path: Path, form: str) -> tuple[Floats, Integers]:
+    """Triangles of OBJ and PLY, larger polygons fanned out."""
+    # It loads a reader of every format it knows, which other files need not wait for.
+    import meshio
+
+    try:
+        if form == "ply":
+            # Of the format's names of types the library lacks one, which stands in the header alone.
+            header, end, data = path.read_bytes().partition(b"end_header")
+            mesh = meshio.ply.read(BytesIO(header.replace(b" ushort ", b" uint16 ") + end + data))
+        else:
+            mesh = meshio.read(path, form)
+    # The library's readers fail as text and numbers do, on files that are not what they seem.
+    except (meshio.ReadError, ValueError, IndexError, KeyError, TypeError, AssertionError, SystemExit) as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: meshio says {problem}") from None
+    polygons = [np.asarray(some.data, dtype=np.int64) for some in mesh.cells if some.type in _POLYGONS]
+    fans = [some[:, [0, k, k + 1]] for some in polygons for k in range(1, some.shape[1] - 1)]
+    numbers = np.concatenate([np.zeros((0, 3), dtype=np.int64), *fans])
+    if len(numbers) and not 0 <= numbers.min() <= numbers.max() < len(mesh.points):
+        raise ParameterError("file", str(path), f"{_EXPECTED}, whose triangles name corners that are there")
+    return numbered_corners(np.asarray(mesh.points, dtype=float)[:, :3][numbers])[:2]
 
 
 def _read_3mf(path: Path) -> tuple[Floats, Integers]:

@@ -18,6 +18,7 @@ from benchmarks import (
     memory,
     meshes,
     parameterisation,
+    skins,
     solid_against_sewing,
     solid_against_thickening,
     startup,
@@ -38,6 +39,7 @@ BENCHMARKS = (
     solid_against_thickening,
     solid_against_sewing,
     memory,
+    skins,
     triangles,
     commands,
 )

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         IslandsWarning,
         KernelError,
         ParameterError,
+        PartWarning,
         SelfIntersectionError,
     )
     from gyroid_cad.fields.field import Field
@@ -55,6 +56,7 @@ __all__ = [
     "LatticeReport",
     "Mesh",
     "ParameterError",
+    "PartWarning",
     "PrintCheck",
     "Printer",
     "SelfIntersectionError",
@@ -74,6 +76,7 @@ _HOMES = {
         "IslandsWarning",
         "KernelError",
         "ParameterError",
+        "PartWarning",
         "SelfIntersectionError",
     ),
     "fields.field": ("Field",),

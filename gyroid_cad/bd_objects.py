@@ -99,12 +99,12 @@ class GyroidFill(Part):  # type: ignore[misc]
     ----------
     part : Part, Solid or Compound, optional
         In a builder, the part made so far if left out.
-    cell_size, thickness, density, kind, skin, openings
+    cell_size, thickness, density, kind, skin, openings, core
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings may be faces of the part,
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
         In a builder, the filled part takes the place of what is there.
-    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface
+    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface, solids
         As of :func:`gyroid_cad.fill`.
 
     Attributes
@@ -138,6 +138,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         *,
         skin: float | None = None,
         openings: Sequence[Any] = (),
+        core: Any = None,
         mode: Mode = Mode.REPLACE,
         origin: Point = (0.0, 0.0, 0.0),
         rotation: Point = (0.0, 0.0, 0.0),
@@ -148,6 +149,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         tolerance: float | None = None,
         lattice: Lattice | None = None,
         surface: SurfaceName = "gyroid",
+        solids: Sequence[str | int] = (),
     ) -> None:
         # As the host's operations do, not as its objects: those are placed at the builder's locations.
         context: BuildPart | None = BuildPart._get_context("GyroidFill")
@@ -167,10 +169,12 @@ class GyroidFill(Part):  # type: ignore[misc]
             material_density,
             skin=skin,
             openings=openings,
+            core=core,
             tolerance=tolerance,
             lattice=lattice,
             surface=surface,
             keep_islands=keep_islands,
+            solids=solids,
         )
         self.report = filled.report
         self.mode = mode

@@ -109,6 +109,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     origin: Point = (0.0, 0.0, 0.0),
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
@@ -117,6 +118,7 @@ def gyroid_fill(
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
+    solids: Sequence[str | int] = (),
 ) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
@@ -125,8 +127,8 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin, openings, origin, rotation, fit, drop_islands, keep_islands, tolerance, \
-    lattice, surface
+    cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
+    tolerance, lattice, surface, solids
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -164,10 +166,12 @@ def gyroid_fill(
         drop_islands,
         skin=skin,
         openings=[*openings, *selected],
+        core=core,
         tolerance=tolerance,
         lattice=lattice,
         surface=surface,
         keep_islands=keep_islands,
+        solids=solids,
     )
     for name, domain in made.domains.items():
         self.newObject([cq.Shape.cast(domain)]).tag(name)

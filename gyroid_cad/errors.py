@@ -16,6 +16,8 @@ __all__ = [
     "KernelError",
     "MissingHostError",
     "ParameterError",
+    "PartWarning",
+    "SealedVoidsWarning",
     "SelfIntersectionError",
     "host_import",
 ]
@@ -240,6 +242,38 @@ class IslandsWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore", IslandsWarning)
     ...     solid = Lattice((1, 1, 1), 10, density=0.2, trim="box").solid()
+    """
+
+
+class PartWarning(UserWarning):
+    """A part is not filled as it was given: its solids were repaired, or united where they overlap.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, PartWarning, fill
+    >>> pair = cq.Workplane().box(4, 4, 4).add(cq.Workplane().box(2, 2, 6))
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", PartWarning)
+    ...     filled = fill(pair, cell_size=8, density=0.3, fit=FitSettings(5))
+    >>> filled.report.remarks
+    ('solid 1 of 2 and solid 2 of 2 have 16 mm3 in common: united',)
+    """
+
+
+class SealedVoidsWarning(UserWarning):
+    """A filled part encloses space that nothing, no resin and no powder, can leave.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import cadquery as cq
+    >>> from gyroid_cad import FitSettings, fill
+    >>> from gyroid_cad.errors import SealedVoidsWarning
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", SealedVoidsWarning)
+    ...     filled = fill(cq.Workplane().box(4, 4, 4), 8, density=0.2, skin=0.5, fit=FitSettings(5))
     """
 
 

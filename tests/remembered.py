@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from gyroid_cad.filling import fill as filling
+from gyroid_cad.filling.part import part_of
 from gyroid_cad.surface.fit import FitSettings
 
 
@@ -20,7 +20,7 @@ def filled_once(fill: Callable[..., Any]) -> Callable[..., Any]:
         bound.apply_defaults()
         settings = {name: plain(value) for name, value in bound.arguments.items() if name not in ("part", "progress")}
         settings["fit"] = settings["fit"] or FitSettings()
-        part = filling.part_of(bound.arguments["part"])
+        part = part_of(bound.arguments["part"])
         size = *part.low.round(6).tolist(), *part.high.round(6).tolist(), round(part.volume, 6)
         key = size, tuple(settings.items())
         if key not in known:

@@ -16,7 +16,7 @@ from click.shell_completion import shell_complete
 
 from gyroid_cad.cli.messages import BAD_USAGE, Session, debug_option, failed
 from gyroid_cad.cli.options import version_option
-from gyroid_cad.errors import IslandsWarning
+from gyroid_cad.errors import IslandsWarning, PartWarning, SealedVoidsWarning
 
 __all__ = ["answered_shell", "commands", "completion_command", "main"]
 
@@ -190,6 +190,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ):
             # The tables and the JSON tell of them.
             warnings.simplefilter("ignore", IslandsWarning)
+            warnings.simplefilter("ignore", SealedVoidsWarning)
+            warnings.simplefilter("ignore", PartWarning)
             commands.invoke(context)
         return DONE
     except click.exceptions.Exit as left:

@@ -53,7 +53,7 @@ __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
 # Of the part and of how it is filled, whatever lattice fills it.
-_OWN = ("kind", "skin", "origin", "rotation", "drop_islands", "keep_islands", "material_density")
+_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density")
 
 
 def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
@@ -104,6 +104,18 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "may be repeated.",
 )
 @click.option(
+    "--core",
+    metavar="FILE",
+    shell_complete=file_paths,
+    help="Instead of --skin, the inner solid that is filled, of a STEP or BREP file: the skin is the part less it.",
+)
+@click.option(
+    "--solid",
+    multiple=True,
+    metavar="NAME",
+    help="Fill only the solids of the part that have this name, or this number; may be repeated.",
+)
+@click.option(
     "--drop-islands",
     is_flag=True,
     help="Drop all pieces not connected to the largest one; small ones, of less than a hundredth of what a cell holds, "
@@ -140,6 +152,8 @@ def fill_command(
     \b
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --skin 1 --opening ">Z"
+    gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --core inner.step
+    gyroid-cad fill machine.step -o light.step --cell-size 7 --density 0.30 --solid bracket
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
     gyroid-cad fill scan.stl -o light.3mf --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
@@ -158,17 +172,18 @@ def fill_command(
     if print_config:
         click.echo(printed_options(), nl=False)
         return
-    _require_another_file(part, output)
+    for read in filter(None, (part, given["core"])):
+        _require_another_file(read, output)
     written = {name: given[name] for name in ("schema", "deviation", "angle")}
     require_settings((1, 1, 1), **written)
     checked = None if printer is None else check_by(printer)
-    route = _route(part, given["route"], output)
-    if route == TRIANGLES:
+    settings["route"] = _route(part, given["route"], output)
+    if settings["route"] == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         settings["deviation"], written = given["deviation"], {}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         try:
-            filled = fill(part, progress=progress, route=route, **settings)
+            filled = fill(part, progress=progress, **settings)
         except KernelError as failed:
             raise KernelError(str(failed).replace('route="triangles"', "--route triangles")) from failed
         filled.write(*output, **written, progress=progress)
@@ -201,16 +216,16 @@ def _route(part: str, chosen: Route | None, output: Sequence[str]) -> Route:
     return route
 
 
-def _require_another_file(part: str, output: Sequence[str]) -> None:
-    """Check the files to be written: none of them may be the part itself.
+def _require_another_file(read: str, output: Sequence[str]) -> None:
+    """Check the files to be written: none of them may be one that is read.
 
     Raises
     ------
     ParameterError
     """
     for path in require_formats(output):
-        if path.exists() and Path(part).exists() and path.samefile(part):
-            raise ParameterError("output", str(path), "another file than the part that is filled")
+        if path.exists() and Path(read).exists() and path.samefile(read):
+            raise ParameterError("output", str(path), "another file than the part that is filled and its core")
 
 
 def _settings(given: dict[str, Any]) -> dict[str, Any]:
@@ -222,6 +237,7 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     """
     own = {name: given[name] for name in _OWN}
     own["openings"] = [_face(opening) for opening in given["opening"]]
+    own["solids"] = given["solid"]
     if given["cells"] is not None:
         return {**own, "lattice": lattice_of(given)}
     of_blocks = [name for name in (*PAPER_OPTIONS, "scale_field", "map") if given[name] is not None]

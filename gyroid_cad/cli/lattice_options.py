@@ -44,7 +44,7 @@ _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
 # Of the files that "build" writes: other commands that take the same lattice pass over them.
 _BUILD_KEYS, _BUILD_FLAGS = ("output", "schema", "deviation", "angle", "instances"), ("instances",)
 # Keys that name files, which a command writes or reads: in the folder of the file that names them.
-_WRITTEN, _READ = ("output", "histogram", "screenshot"), ("part", "printer")
+_WRITTEN, _READ = ("output", "histogram", "screenshot"), ("part", "core", "printer")
 
 
 def take_defaults(

@@ -143,6 +143,8 @@ FILL = (
     _row("kind"),
     _row("skin"),
     _row("openings", "--opening"),
+    _row("core"),
+    _row("solids", "--solid"),
     _row("origin"),
     _row("rotation"),
     _row("drop islands"),

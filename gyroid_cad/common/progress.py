@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-__all__ = ["Progress", "Timed", "report_progress", "timed"]
+__all__ = ["Progress", "Timed", "named_progress", "report_progress", "timed"]
 
 Progress = Callable[[str, int, int], None]
 Timed = Callable[[str], AbstractContextManager[None]]
@@ -26,3 +26,12 @@ def report_progress(progress: Progress | None, stage: str, done: int, total: int
     """Tell how far a stage has come, if anyone listens."""
     if progress is not None:
         progress(stage, done, total)
+
+
+def named_progress(progress: Progress | None, name: str) -> Progress | None:
+    """Return a progress that tells the name of what each stage is of, where there are several.
+
+    >>> named_progress(lambda stage, done, total: print(stage), "solid 2 of 3")("split", 0, 1)
+    solid 2 of 3: split
+    """
+    return progress and (lambda stage, done, total: progress(f"{name}: {stage}", done, total))

@@ -16,32 +16,32 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import ROUTES, Kind, Route, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
-from gyroid_cad.common.progress import Progress, Timed, timed
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.common.progress import Progress, named_progress, timed
+from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.extent import BoundedExtent
-from gyroid_cad.filling.infill import Infill, InfillIn, block_infill, endless_infill, require_cover
-from gyroid_cad.filling.part import Filling, Outcome, part_of, without_islands
-from gyroid_cad.filling.report import FillReport
+from gyroid_cad.filling.distance_skin import Shell
+from gyroid_cad.filling.infill import described_infill, require_cover
+from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
+from gyroid_cad.filling.report import FillReport, joint_report
 from gyroid_cad.filling.triangle_part import naming_triangles
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, grams_of, regions_of, skin_of
+from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
-from gyroid_cad.kernel.part import Part, selected_faces
+from gyroid_cad.kernel.part import Part, require_part, selected_faces
+from gyroid_cad.kernel.skin import Hollow, has_face, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
-from gyroid_cad.surface.families import MinimalSurface, surface_named
+from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.surface.fit_report import fit_within
-from gyroid_cad.trim.islands import Islands, island_rule
-from gyroid_cad.wall.covering import Frame, frame_of, placement
-from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size, valid_tolerance
+from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids
+from gyroid_cad.wall.covering import frame_of, placement
+from gyroid_cad.wall.parameters import valid_tolerance
 
 __all__ = ["Filled", "fill"]
 
@@ -185,10 +185,12 @@ def fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    core: Any = None,
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
+    solids: Sequence[str | int] = (),
     route: Route = "brep",
     deviation: float | None = None,
 ) -> Filled:
@@ -197,7 +199,9 @@ def fill(
     Parameters
     ----------
     part : shape, Workplane or path-like
-        A TopoDS_Shape, a shape of CadQuery or build123d, or a STEP or BREP file; its solids must be closed and valid.
+        A TopoDS_Shape, a shape or an assembly of CadQuery or build123d, or a STEP or BREP file. Its solids are filled
+        each by itself. Those that overlap are united, and those that are open or invalid repaired where the kernel's
+        tools can: the report says so, and a :class:`~gyroid_cad.PartWarning`.
     cell_size : float
         Period of the cubic cell, in mm.
     thickness : number or field, optional
@@ -223,6 +227,9 @@ def fill(
     openings : sequence
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it.
+    core : shape, Workplane or path-like, optional
+        Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
+        core, open wherever the core comes to the part's boundary.
     tolerance : float, optional
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
@@ -231,11 +238,14 @@ def fill(
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
+    solids : sequence of str or int
+        Which of the part's solids are filled: names that its file or assembly gives them, or numbers from 1. All of
+        them if left out.
     route : {"brep", "triangles"}
-        Through exact solids; or through triangles alone, from and to what is printed: an STL, 3MF, OBJ or PLY file may
-        be the part, no solid is built, and a :class:`~gyroid_cad.filling.triangles.FilledTriangles` comes out.
+        Through exact solids; or through triangles alone, for what is printed: the part may be an STL, 3MF, OBJ or PLY
+        file, and what comes out is no :class:`Filled` but :class:`~gyroid_cad.FilledTriangles`.
     deviation : float, optional
-        Of the triangles of that route, in mm; at the other, :meth:`Filled.write` takes it.
+        Of the triangles of that route, in mm; of the other, :meth:`Filled.write` takes it.
 
     Returns
     -------
@@ -259,91 +269,89 @@ def fill(
     """
     frame = frame_of(*placement(origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
-    shell = None if skin is None else skin_of(skin)
-    if openings and shell is None:
-        raise ParameterError("openings", openings, "none without a skin")
-    if shell is not None and kind == SURFACE:
-        raise ParameterError("skin", skin, "none round the bare surface, which is no solid")
+    shell = checked_skin(skin, openings, core, kind)
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     if route not in ROUTES:
         raise ParameterError("route", route, " or ".join(ROUTES))
-    regions, size, settings, infill_in = _described(
+    regions, size, settings, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
     )
-    if route == TRIANGLES and shell is not None:
-        raise ParameterError("skin", skin, "none at route triangles")
     if route == TRIANGLES:
         cover = partial(require_cover, cell_size=size, control_points=settings.control_points)
-        covered = cover if lattice is None else None
-        skinned = (shell, openings, deviation)
-        job = TriangleJob(kind, size, regions, infill_in, covered, frame, *skinned, rule, grams, progress)
-        # A class of its own, which has all of Filled that needs no B-rep.
-        return job.filled(part)  # type: ignore[return-value]
+        given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
+        job = TriangleJob(kind, size, regions, infill_in, *given)
+        # Not of the class, but with all of it that needs no B-rep.
+        return job.filled(part, solids, Shell(shell, openings, core))  # type: ignore[return-value]
     if deviation is not None:
         raise ParameterError("deviation", deviation, "none at route brep, whose solids write(deviation=...) meshes")
-    whole = part_of(part)
-    if lattice is None:
-        require_cover(whole.low, whole.high, size, settings.control_points)
-    with naming_triangles(kind):
-        hollow = None if shell is None else hollowed(whole, shell, selected_faces(whole, openings))
-        core = whole if hollow is None else hollow.core
-        filling = Filling(whole, hollow, regions, lambda f, timed: infill_in(core, f, timed), size, progress)
-        outcome = filling.run(frame)
-    domains, islands = without_islands(outcome.domains, filling.cells, rule)
-    made = _reported(filling, replace(outcome, domains=domains), islands, kind, shell, grams)
+    parts, remarks = parts_of(part, solids)
+    if core is not None and len(parts) > 1:
+        raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
+    for remark in remarks:
+        warn_caller(remark, PartWarning)
+    made, islands = [], Islands()
+    for (name, whole), faces in zip(parts, _opened(parts, openings), strict=True):
+        told = progress if len(parts) == 1 else named_progress(progress, name)
+        if lattice is None:
+            require_cover(whole.low, whole.high, size, settings.control_points)
+        with naming_triangles(kind, name if len(parts) > 1 else ""):
+            hollow = _hollow(whole, shell, faces, core)
+            inner = whole if hollow is None else hollow.core
+            filling = Filling(whole, hollow, regions, partial(infill_in, inner), size, told)
+            outcome = filling.run(frame)
+        domains, left = without_islands(outcome.domains, filling.cells, rule)
+        domains, voids = without_specks(domains, filling)
+        made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))
+        islands += left
     islands.warn("drop_islands drops")
-    return made
+    together = _together(made, remarks)
+    warn_of_voids(together.report.voids)
+    return together
 
 
-def _described(
-    kind: Kind,
-    cell_size: float | None,
-    thickness: FieldLike | None,
-    density: FieldLike | None,
-    fit: FitSettings,
-    tolerance: float | None,
-    lattice: Lattice | None,
-    surface: MinimalSurface,
-) -> tuple[tuple[Region, ...], float, FitSettings, InfillIn]:
-    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame."""
-    if lattice is not None:
-        given = {"cell_size": cell_size, "thickness": thickness, "density": density, "tolerance": tolerance}
-        for name, value in given.items():
-            if value is not None:
-                raise ParameterError(name, value, "none beside a lattice, which has its own")
-        if kind != SHEET:
-            raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
-        regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
-        block: InfillIn = lambda part, frame, timed, least=0.0: block_infill(lattice, frame)  # noqa: E731
-        return regions.regions, lattice.cell_size, fit, block
-    size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
-    require_cell_size(size)
-    wanted = regions_of(kind, size, thickness, density, surface.tube)
-    settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
-    closeness = tolerance or USUAL_TOLERANCE
+def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) -> Hollow | None:
+    """The part in skin and core, if it has a skin."""
+    if core is None:
+        return None if skin is None else hollowed(part, skin, openings)
+    try:
+        inner = part_of(core)
+    except ParameterError as refused:
+        raise ParameterError("core", refused.value, refused.accepted) from None
+    return hollow_round(part, inner)
 
-    def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
-        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
-        smallest = float(np.min(part.high - part.low))
-        if smallest <= made.max_thickness:
-            name, given = ("thickness", thickness) if density is None else ("density", density)
-            raise ParameterError(
-                name,
-                given,
-                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
-            )
-        return made
 
-    return wanted.regions, size, settings, endless
+def _opened(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[list[Any]]:
+    """The faces of each part that a user's openings are: selectors are asked of all of them together."""
+    if len(parts) == 1 or not openings:
+        return [selected_faces(part, openings) for _, part in parts]
+    faces = selected_faces(require_part(compound_of(part.shape for _, part in parts)), openings)
+    return [[face for face in faces if has_face(part, face)] for _, part in parts]
+
+
+def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
+    """Bodies that were filled each by itself, as one."""
+    report = joint_report([one.report for one in filled], remarks)
+    if len(filled) == 1:
+        return Filled(filled[0].domains, report)
+    names = dict.fromkeys(name for one in filled for name in one.domains)
+    return Filled(
+        {name: compound_of(one.domains[name] for one in filled if name in one.domains) for name in names}, report
+    )
 
 
 def _reported(
-    filling: Filling, outcome: Outcome, islands: Islands, kind: Kind, skin: float | None, grams: float | None
+    filling: Filling,
+    outcome: Outcome,
+    islands: Islands,
+    voids: tuple[SealedVoid, ...],
+    kind: Kind,
+    grams: float | None,
 ) -> Filled:
 
     domains = outcome.domains
+    skin = None if filling.hollow is None else filling.hollow.thickness
     shapes = {
         name: some[0].shape if len(some) == 1 else compound_of(made.shape for made in some)
         for name, some in domains.items()
@@ -372,6 +380,7 @@ def _reported(
         islands_volume=islands.kept_volume,
         dropped=islands.dropped,
         dropped_volume=islands.dropped_volume,
+        voids=voids,
         cut_patches=outcome.cut,
         whole_patches=outcome.whole,
         by_sections=outcome.by_sections,

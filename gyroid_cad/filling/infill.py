@@ -8,17 +8,20 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.checks import finite_number
+from gyroid_cad.common.choices import Kind
 from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
-from gyroid_cad.errors import SelfIntersectionError
-from gyroid_cad.fields.field import Field
+from gyroid_cad.errors import ParameterError, SelfIntersectionError
+from gyroid_cad.fields.field import Field, FieldLike
 from gyroid_cad.filling.extent import BoundedExtent, extent_of
-from gyroid_cad.filling.wanted import Region, Regions
+from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
@@ -34,8 +37,9 @@ from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
 
-__all__ = ["Infill", "InfillIn", "block_infill", "endless_infill", "require_cover"]
+__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_cover"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -128,6 +132,51 @@ class InfillIn(Protocol):
     """Gives the lattice for a part and a frame, each stage timed, with a uniform wall of so many mm at least."""
 
     def __call__(self, part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill: ...
+
+
+def described_infill(
+    kind: Kind,
+    cell_size: float | None,
+    thickness: FieldLike | None,
+    density: FieldLike | None,
+    fit: FitSettings,
+    tolerance: float | None,
+    lattice: Lattice | None,
+    surface: MinimalSurface,
+) -> tuple[tuple[Region, ...], float, FitSettings, InfillIn]:
+    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame.
+
+    Arguments and errors are those of :func:`gyroid_cad.fill`.
+    """
+    if lattice is not None:
+        given = {"cell_size": cell_size, "thickness": thickness, "density": density, "tolerance": tolerance}
+        for name, value in given.items():
+            if value is not None:
+                raise ParameterError(name, value, "none beside a lattice, which has its own")
+        if kind != SHEET:
+            raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
+        regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
+        block: InfillIn = lambda part, frame, timed, least=0.0: block_infill(lattice, frame)  # noqa: E731
+        return regions.regions, lattice.cell_size, fit, block
+    size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
+    require_cell_size(size)
+    wanted = regions_of(kind, size, thickness, density, surface.tube)
+    settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
+    closeness = tolerance or USUAL_TOLERANCE
+
+    def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
+        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
+        smallest = float(np.min(part.high - part.low))
+        if smallest <= made.max_thickness:
+            name, given = ("thickness", thickness) if density is None else ("density", density)
+            raise ParameterError(
+                name,
+                given,
+                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
+            )
+        return made
+
+    return wanted.regions, size, settings, endless
 
 
 def endless_infill(

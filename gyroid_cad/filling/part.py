@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -19,19 +19,31 @@ from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
-from gyroid_cad.kernel.apart import read_shape
-from gyroid_cad.kernel.check import compound_of, is_valid, topology
+from gyroid_cad.host_shapes import named_shapes
+from gyroid_cad.kernel.apart import read_named
+from gyroid_cad.kernel.check import compound_of, is_valid, sealed_shells, topology, without_shells
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.regions import split_by_region
+from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.kernel.split import bounded_solids, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
-from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
+from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "part_of", "shape_of", "without_islands"]
+__all__ = [
+    "Filling",
+    "Made",
+    "Outcome",
+    "part_of",
+    "parts_of",
+    "shapes_of",
+    "solid_names",
+    "without_islands",
+    "without_specks",
+]
 
 Floats = NDArray[np.float64]
 
@@ -275,13 +287,55 @@ def without_islands(
     return chosen, islands
 
 
-def part_of(given: Any) -> Part:
-    """The closed, valid solids of whatever a user gives as a part.
+def without_specks(
+    domains: dict[str, list[Made]], filling: Filling
+) -> tuple[dict[str, list[Made]], tuple[SealedVoid, ...]]:
+    """Return the solids of every domain without specks of void, and the voids that they enclose, the largest first.
+
+    The part's own voids are none that filling sealed.
+
+    Parameters
+    ----------
+    domains : dict
+        As of :class:`Outcome`. What a wall leaves and the bare surface enclose nothing.
+    filling : Filling
+        That they come from.
+    """
+    least, voids = speck_below(filling.cell_size), []
+    chosen = dict(domains)
+    for name in (region.name for region in filling.regions if not (region.fluid or region.surface)):
+        chosen[name] = []
+        for made in domains.get(name, ()):
+            sealed = sealed_shells(made.shape, filling.part.shape)
+            voids += [SealedVoid(volume, place) for _, volume, place in sealed if volume >= least]
+            specks = [shell for shell, volume, _ in sealed if volume < least]
+            chosen[name].append(_without(made, specks) if specks else made)
+    return {name: some for name, some in chosen.items() if some}, tuple(sorted(voids, key=lambda void: -void.volume))
+
+
+def _without(made: Made, shells: Sequence[KernelShape]) -> Made:
+    """A solid that is filled where some of its shells run round voids."""
+    sizes = np.array([measure(shell) for shell in shells])
+    volume, area = np.abs(sizes).sum(axis=0).tolist()
+    return Made(without_shells(made.shape, shells), made.volume + volume, made.area - area)
+
+
+def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
+    """The closed, valid solids of whatever a user gives as a part, each by itself; those that overlap are united.
 
     Parameters
     ----------
     given : shape, Workplane or path-like
         As of :func:`fill`.
+    solids : sequence of str or int
+        Names or numbers of those that are wanted, if not all.
+
+    Returns
+    -------
+    parts : list of (str, Part)
+        Each with what to call it.
+    remarks : list of str
+        On what was repaired or united.
 
     Raises
     ------
@@ -289,23 +343,28 @@ def part_of(given: Any) -> Part:
     ExportError
         If a file is neither STEP nor BREP, or holds no shape.
     """
-    return require_part(shape_of(given))
+    separate, remarks = separate_solids(*shapes_of(given), solid_names(solids))
+    return [(name, require_part(solid)) for name, solid in separate], remarks
 
 
-def shape_of(given: Any) -> KernelShape:
-    """The kernel's shape of whatever a user gives as a part, as :func:`part_of` takes it; unchecked."""
-    if isinstance(given, str | os.PathLike):
-        if format_of(given) in TRIANGLE_FORMATS:
-            raise ParameterError("part", str(given), 'a STEP or BREP file; triangles are filled by route="triangles"')
-        return read_shape(given)
-    if hasattr(given, "vals"):
-        return compound_of(shape.wrapped for shape in given.vals())
-    shape = getattr(given, "wrapped", given)
-    if not hasattr(shape, "ShapeType"):
-        raise ParameterError(
-            "part", given, "a shape of the kernel, CadQuery or build123d, a Workplane, a STEP or BREP file"
-        )
-    return shape
+def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]]]:
+    """The kernel's shapes of whatever a user gives as a part, unchecked, and the names of each."""
+    if not isinstance(given, str | os.PathLike):
+        return named_shapes(given)
+    if format_of(given) in TRIANGLE_FORMATS:
+        raise ParameterError("part", str(given), 'a STEP or BREP file; triangles are filled by route="triangles"')
+    return read_named(given)
+
+
+def solid_names(solids: Sequence[str | int]) -> list[str | int]:
+    """Names or numbers of the solids that are wanted, be it one alone."""
+    return [solids] if isinstance(solids, str | int) else list(solids)
+
+
+def part_of(given: Any) -> Part:
+    """The same as one part."""
+    parts, _ = parts_of(given)
+    return parts[0][1] if len(parts) == 1 else require_part(compound_of(part.shape for _, part in parts))
 
 
 def _size(made: Made) -> float:

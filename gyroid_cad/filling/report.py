@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, Route
 from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
+from gyroid_cad.trim.islands import SealedVoid
 
-__all__ = ["FillReport"]
+__all__ = ["FillReport", "joint_report"]
+
+# Of several bodies these add up.
+_SUMMED = (
+    "solids",
+    "faces",
+    "part_volume",
+    "volume",
+    "area",
+    "islands",
+    "islands_volume",
+    "dropped",
+    "dropped_volume",
+    "cut_patches",
+    "whole_patches",
+)
+_MASSES = ("mass", "part_mass")
+
+# In the table; the report has all of them.
+_VOIDS_SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +46,7 @@ class FillReport:
     min_wall : float, optional
         The lattice's wall where it is thinnest, or the skin if that is thinner, in mm; none of a network.
     skin : float, optional
-        In mm.
+        In mm, where it is thinnest.
     solids, faces : int
     valid, closed : bool
         By the kernel's own check; every edge bounds exactly two faces. The bare surface is not closed.
@@ -41,6 +62,9 @@ class FillReport:
         Pieces besides the largest one of each domain, and pieces that were dropped.
     islands_volume, dropped_volume : float
         Of either, in mm3; of the bare surface 0.
+    voids : tuple of SealedVoid
+        Space that the solids enclose and no opening reaches, the largest first, each with its volume in mm3 and its
+        place in mm; the part's own voids are none of them.
     cut_patches, whole_patches : int
         That the part's boundary may cross, and that lie wholly inside.
     by_sections : bool
@@ -51,12 +75,16 @@ class FillReport:
         By stage.
     cells_alike : bool
         False where a scale field or a map makes cells of other sizes.
+    bodies : int
+        Solids of the part, each of which was filled by itself.
+    remarks : tuple of str
+        On what was repaired or united before that.
     route : {"brep", "triangles"}
         At the latter ``faces`` counts triangles, and patches are not told apart by the part's boundary.
     deviation : float, optional
         Of triangles from the lattice and the part, in mm, at that route.
-    repairs : tuple of str
-        That the part's triangles needed.
+    fillet : float, optional
+        Radius with which wall and skin meet, in mm.
 
     Examples
     --------
@@ -91,15 +119,18 @@ class FillReport:
     islands_volume: float
     dropped: int
     dropped_volume: float
+    voids: tuple[SealedVoid, ...]
     cut_patches: int
     whole_patches: int
     by_sections: bool
     shift: Point
     seconds: dict[str, float]
     cells_alike: bool
+    bodies: int = 1
+    remarks: tuple[str, ...] = ()
     route: Route = "brep"
     deviation: float | None = None
-    repairs: tuple[str, ...] = ()
+    fillet: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -111,15 +142,20 @@ class FillReport:
         return [
             ("kind", f"{self.kind}, {cell_shown(self.cell_size, self.cells_alike)}, wall {self.thickness:.6g} mm"),
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
-            *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
+            *([] if self.skin is None else [("skin", f"{self.skin:g} mm{self._rounded()}")]),
+            *([] if self.bodies == 1 else [("bodies", f"{self.bodies}, each filled by itself")]),
+            *(("part", remark) for remark in self.remarks),
             self._counted(),
-            *[("repaired", repair) for repair in self.repairs],
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
             ("area", f"{self.area:.6g} mm2"),
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
             ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
+            *([("sealed voids", self._voids_shown())] if self.voids else []),
             *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
         ]
+
+    def _rounded(self) -> str:
+        return "" if self.fillet is None else f", rounded by {self.fillet:g} mm where walls meet it"
 
     def _counted(self) -> tuple[str, str]:
         if self.route == "triangles":
@@ -128,5 +164,41 @@ class FillReport:
         state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
         return "solids, faces", f"{self.solids}, {self.faces} ({state})"
 
+    def _voids_shown(self) -> str:
+        shown = "; ".join(map(str, self.voids[:_VOIDS_SHOWN]))
+        return f"{len(self.voids)} that no opening reaches: {shown}{'; ...' * (len(self.voids) > _VOIDS_SHOWN)}"
+
     def __str__(self) -> str:
         return text_table(self.rows())
+
+
+def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:
+    """Report on several bodies together, each of which was filled by itself.
+
+    Parameters
+    ----------
+    reports : sequence of FillReport
+        One of each body.
+    remarks : sequence of str
+        On what was done to the part before.
+    """
+    first, remarks = reports[0], tuple(remarks)
+    if len(reports) == 1:
+        return replace(first, remarks=remarks)
+    sums = {name: sum(getattr(report, name) for report in reports) for name in _SUMMED}
+    masses = {name: sum(getattr(report, name) for report in reports) for name in _MASSES if first.mass is not None}
+    stages = dict.fromkeys(stage for report in reports for stage in report.seconds)
+    return replace(
+        first,
+        **sums,
+        **masses,
+        thickness=max(report.thickness for report in reports),
+        min_wall=min((report.min_wall for report in reports if report.min_wall is not None), default=None),
+        density=sums["volume"] / sums["part_volume"],
+        by_sections=all(report.by_sections for report in reports),
+        shift=next((report.shift for report in reports if any(report.shift)), first.shift),
+        seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},
+        voids=tuple(sorted((void for report in reports for void in report.voids), key=lambda void: -void.volume)),
+        bodies=len(reports),
+        remarks=remarks,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,10 @@ from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind, Route
 from gyroid_cad.common.formats import STL, THREE_MF, TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.errors import KernelError, ParameterError, PartWarning
+from gyroid_cad.filling.distance_skin import Shell, opened_facets, without_specks
 from gyroid_cad.filling.infill import Infill, InfillIn
-from gyroid_cad.filling.report import FillReport
+from gyroid_cad.filling.report import FillReport, joint_report
 from gyroid_cad.filling.triangle_part import TrianglePart, triangle_part
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
@@ -27,13 +28,24 @@ from gyroid_cad.mesh.triangles.triangulation import triangulated
 from gyroid_cad.mesh.triangles.writing import storable_triangles, write_triangles
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, triangles_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
-from gyroid_cad.trim.islands import IslandRule, Islands, islands_of, kept_pieces
+from gyroid_cad.trim.islands import (
+    IslandRule,
+    Islands,
+    SealedVoid,
+    islands_of,
+    kept_pieces,
+    speck_below,
+    warn_caller,
+    warn_of_voids,
+)
 from gyroid_cad.wall.covering import Frame
+from gyroid_cad.wall.grading import THINNEST_WALL
 
 __all__ = ["TRIANGLES", "FilledTriangles", "TriangleFilling", "TriangleJob"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 TRIANGLES: Route = "triangles"
 # The usual deviation in parts of the cell size and of the wall.
@@ -118,15 +130,13 @@ class FilledTriangles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleFilling:
-    """Part to be filled, and the lattice that fills it.
+    """Body of a part to be filled, and the lattice that fills it.
 
     Attributes
     ----------
-    part : TrianglePart
-    core : Body
-        What of it is filled: the whole part, or what its skin leaves.
-    skin : float, optional
-        In mm.
+    part : Body
+    core : Body, optional
+        What of it is filled, if not all: it may reach beyond the part where a skin is open.
     regions : tuple of Region
     infill : Infill
     deviation : float
@@ -136,14 +146,13 @@ class TriangleFilling:
         By stage.
     """
 
-    part: TrianglePart
-    core: Body
-    skin: float | None
+    part: Body
+    core: Body | None
     regions: tuple[Region, ...]
     infill: Infill
     deviation: float
     progress: Progress | None
-    seconds: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float]
 
     def domains(self) -> dict[str, Body]:
         """The body of every region.
@@ -156,11 +165,11 @@ class TriangleFilling:
         with timed(self.seconds, "triangles", self.progress):
             wall = self._wall()
         with timed(self.seconds, "cut", self.progress):
-            if any(region.lowest is not None and region.highest is not None for region in self.regions):
-                part, core = self.part.body.moved(-self.middle), self.core.moved(-self.middle)
-                found: dict[str, Body] = {SHEET: part & wall if self.skin is None else part - (core - wall)}
+            part, core = self.part.moved(-self.middle), None if self.core is None else self.core.moved(-self.middle)
+            if self.regions[0].name == SHEET:
+                found: dict[str, Body] = {SHEET: part & wall if core is None else part - (core - wall)}
             else:
-                found = self._between(wall)
+                found = self._between(part, core, wall)
             simpler = {name: body.simplified(_SIMPLER * self.deviation) for name, body in found.items()}
         if all(body.empty for body in simpler.values()):
             raise KernelError("nothing of the lattice lies in the part")
@@ -169,7 +178,7 @@ class TriangleFilling:
     @property
     def middle(self) -> Floats:
         """Point that is brought to the origin, where single precision is finest, in mm; shape (3,)."""
-        return np.asarray(self.part.body.bounds.mean(axis=0))
+        return np.asarray(self.part.bounds.mean(axis=0))
 
     def _wall(self) -> Body:
         wall = self.infill.wall.moved(np.eye(3), -self.middle)
@@ -178,10 +187,9 @@ class TriangleFilling:
             raise KernelError("the triangles of the lattice's wall are no closed manifold")
         return body
 
-    def _between(self, wall: Body) -> dict[str, Body]:
+    def _between(self, part: Body, core: Body | None, wall: Body) -> dict[str, Body]:
         """Networks or channels: pieces that the wall leaves, by the side of it that they are on."""
-        part, core = self.part.body.moved(-self.middle), self.core.moved(-self.middle)
-        pieces = (core - wall).pieces()
+        pieces = ((part if core is None else core) - wall).pieces()
         above = self._above(pieces)
         found = {}
         for region in self.regions:
@@ -191,15 +199,15 @@ class TriangleFilling:
             )
             # A network with more than its half of space has the wall too.
             end = -(region.highest or 0.0) if region.lowest is None else region.lowest
-            if not region.fluid and end < 0:
-                found[region.name] = part - others
+            if region.fluid or core is None:
+                found[region.name] = part - others if end < 0 and not region.fluid else own & part
             else:
-                found[region.name] = own if self.skin is None or region.fluid else own | (part - core)
+                found[region.name] = part - others if end < 0 else part - (core - own)
         return found
 
     def _above(self, pieces: Sequence[Body]) -> list[bool]:
         """Tell which pieces lie on the side of the mid-surface that its normals point to, by the vertices of each."""
-        places = []
+        places = [np.empty((0, 3))]
         for piece in pieces:
             vertices = piece.triangles()[0]
             places.append(vertices[np.linspace(0, len(vertices) - 1, _ASKED).astype(int)])
@@ -210,7 +218,7 @@ class TriangleFilling:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleJob:
-    """Lattice, skin and fineness that a part is filled with, by triangles.
+    """Lattice and fineness that a part is filled with, by triangles.
 
     Attributes
     ----------
@@ -223,14 +231,11 @@ class TriangleJob:
     cover : callable, optional
         Checks that there is memory for the cells that cover a box, given its corners.
     frame : Frame
-    skin : float, optional
-        In mm.
-    openings : sequence
-    deviation : float, optional
-        In mm.
     rule : IslandRule
     grams : float, optional
         That a mm3 of the material weighs.
+    deviation : float, optional
+        In mm.
     progress : callable, optional
     """
 
@@ -240,15 +245,13 @@ class TriangleJob:
     infill_in: InfillIn
     cover: Callable[[Floats, Floats], None] | None
     frame: Frame
-    skin: float | None
-    openings: Sequence[Any]
-    deviation: float | None
     rule: IslandRule
     grams: float | None
+    deviation: float | None
     progress: Progress | None
 
-    def filled(self, given: Any) -> FilledTriangles:
-        """The part filled.
+    def filled(self, given: Any, solids: Sequence[str | int], shell: Shell) -> FilledTriangles:
+        """The part filled, each of its bodies by itself.
 
         Raises
         ------
@@ -260,37 +263,80 @@ class TriangleJob:
             require_meshing(finite_number("deviation", self.deviation))
         seconds: dict[str, float] = {}
         with timed(seconds, "part", self.progress):
-            part = triangle_part(given, self.deviation or self.cell_size / _USUAL)
+            whole = triangle_part(given, solids, self._fineness)
+            opened = None if shell.skin is None else opened_facets(whole, shell.openings)
+        for remark in whole.remarks:
+            warn_caller(remark, PartWarning)
+        parts = whole.bodies()
+        if shell.core is not None and len(parts) > 1:
+            raise ParameterError(
+                "core", shell.core, f"none of a part of {len(parts)} bodies, unless solids chooses one"
+            )
+        places, reports, islands = [], [], Islands()
+        for part in parts:
+            own = opened if opened is None or len(parts) == 1 else opened_facets(part, shell.openings)
+            made, report, left = self._body(part, shell, own, seconds)
+            places.append(made)
+            reports.append(report)
+            islands += left
+        islands.warn("drop_islands drops")
+        report = joint_report(reports, whole.remarks)
+        warn_of_voids(report.voids)
+        counts = np.cumsum([0, *(len(vertices) for vertices, _ in places)])
+        triangles = np.concatenate([numbers + first for (_, numbers), first in zip(places, counts[:-1], strict=True)])
+        return FilledTriangles(np.concatenate([vertices for vertices, _ in places]), triangles, report)
+
+    @property
+    def _fineness(self) -> float:
+        """Deviation of the part's triangles, in mm."""
+        return self.deviation or self.cell_size / _USUAL
+
+    def _body(
+        self, part: TrianglePart, shell: Shell, opened: Booleans | None, before: dict[str, float]
+    ) -> tuple[tuple[Floats, Integers], FillReport, Islands]:
+        """Triangles of one body filled, their report, and what islands there were."""
+        seconds = dict(before)
+        before.clear()
+        with timed(seconds, "skin", self.progress):
+            core, skin = shell.core_of(part, opened, self._fineness)
+        inner = part if core is None else TrianglePart(core & part.body)
         if self.cover is not None:
-            self.cover(part.low, part.high)
+            self.cover(inner.low, inner.high)
         network = self.kind in (NETWORK_A, NETWORK_B)
-        least = _SEAM * (self.deviation or self.cell_size / _USUAL) if network else 0.0
-        infill = self.infill_in(part, self.frame, lambda stage: timed(seconds, stage, self.progress), least)
+        least = max(_SEAM * self._fineness, THINNEST_WALL) if network else 0.0
+        infill = self.infill_in(inner, self.frame, lambda stage: timed(seconds, stage, self.progress), least)
         wall = self.cell_size if network else infill.max_thickness
-        deviation = self.deviation or min(self.cell_size / _USUAL, wall / _USUAL_OF_WALL)
-        filling = TriangleFilling(part, part.body, self.skin, self.regions, infill, deviation, self.progress, seconds)
+        deviation = self.deviation or min(self._fineness, wall / _USUAL_OF_WALL)
+        filling = TriangleFilling(part.body, core, self.regions, infill, deviation, self.progress, seconds)
         domains = filling.domains()
         with timed(seconds, "check", self.progress):
             pieces = {name: body.pieces() for name, body in domains.items()}
-            kept, islands = _without_islands(pieces, filling.core.volume / self.cell_size**3, self.rule)
+            kept, islands = _without_islands(pieces, inner.body.volume / self.cell_size**3, self.rule)
             left = [piece for some in kept.values() for piece in some]
-            vertices, triangles = _arrays(left, filling.middle, deviation)
-        report = self._report(filling, kept, islands, len(triangles))
-        islands.warn("drop_islands drops")
-        return FilledTriangles(vertices, triangles, report)
+            voids: list[SealedVoid] = []
+            if not any(region.fluid for region in self.regions):
+                left, voids = without_specks(left, part.body, filling.middle, speck_below(self.cell_size))
+            places = _arrays(left, filling.middle, deviation)
+        return places, self._report(filling, left, islands, voids, skin, len(places[1])), islands
 
     def _report(
-        self, filling: TriangleFilling, kept: dict[str, list[Body]], islands: Islands, count: int
+        self,
+        filling: TriangleFilling,
+        pieces: Sequence[Body],
+        islands: Islands,
+        voids: Sequence[SealedVoid],
+        skin: float | None,
+        count: int,
     ) -> FillReport:
-        infill, part, pieces = filling.infill, filling.part, [piece for some in kept.values() for piece in some]
+        infill, part = filling.infill, filling.part
         volume = sum(piece.volume for piece in pieces)
         walls = [] if self.kind in (NETWORK_A, NETWORK_B) else [infill.min_thickness]
         return FillReport(
             kind=self.kind,
             cell_size=self.cell_size,
             thickness=infill.max_thickness,
-            min_wall=min([*walls, *([] if self.skin is None else [self.skin])], default=None),
-            skin=self.skin,
+            min_wall=min([*walls, *([] if skin is None else [skin])], default=None),
+            skin=skin,
             solids=len(pieces),
             faces=count,
             valid=True,
@@ -305,6 +351,7 @@ class TriangleJob:
             islands_volume=islands.kept_volume,
             dropped=islands.dropped,
             dropped_volume=islands.dropped_volume,
+            voids=tuple(voids),
             cut_patches=infill.complex.patch_count,
             whole_patches=0,
             by_sections=False,
@@ -313,7 +360,6 @@ class TriangleJob:
             cells_alike=infill.grading.cells_alike,
             route=TRIANGLES,
             deviation=filling.deviation,
-            repairs=part.repairs,
         )
 
 

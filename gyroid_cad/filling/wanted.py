@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +25,9 @@ __all__ = [
     "SURFACE",
     "Region",
     "Regions",
+    "checked_skin",
     "grams_of",
     "regions_of",
-    "skin_of",
 ]
 
 Floats = NDArray[np.float64]
@@ -183,8 +185,25 @@ def grams_of(material_density: float) -> float:
     return number / 1000
 
 
-def skin_of(skin: float) -> float:
-    """Thickness of a skin in mm, checked; raises ParameterError."""
+def checked_skin(skin: float | None, openings: Sequence[Any], core: Any, kind: Kind) -> float | None:
+    """Thickness of a skin in mm, if there is to be one of a thickness; raises ParameterError.
+
+    Parameters
+    ----------
+    skin, openings, core, kind
+        As of :func:`gyroid_cad.fill`.
+    """
+    if core is not None and skin is not None:
+        raise ParameterError("skin", skin, "none beside a core: the skin is the part less its core")
+    if core is not None and openings:
+        raise ParameterError("openings", openings, "none beside a core, which comes to the boundary where it is open")
+    if openings and skin is None:
+        raise ParameterError("openings", openings, "none without a skin")
+    name, given = ("core", core) if skin is None else ("skin", skin)
+    if given is not None and kind == SURFACE:
+        raise ParameterError(name, given, "none round the bare surface, which is no solid")
+    if skin is None:
+        return None
     thickness = positive_number("skin", skin, "a length in mm, a finite number above 0")
     if thickness < THINNEST_WALL:
         raise ParameterError("skin", skin, f"at least {THINNEST_WALL:g} mm, the thinnest wall")

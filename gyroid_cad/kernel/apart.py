@@ -17,6 +17,7 @@ from OCP.TopoDS import TopoDS_Iterator, TopoDS_Shape
 from gyroid_cad.common.formats import BREP, STEP, Format, format_of
 from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ExportError
+from gyroid_cad.kernel.assembly import read_bodies
 from gyroid_cad.kernel.brep import read_brep
 from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.kernel.processes import Started, started
@@ -25,8 +26,10 @@ from gyroid_cad.kernel.step import read_step
 __all__ = [
     "Contents",
     "answer",
+    "bodies_of_step",
     "brep_contents",
     "read_apart",
+    "read_named",
     "read_shape",
     "require_cad_file",
     "step_contents",
@@ -60,6 +63,25 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
     form = require_cad_file(path)
     ((shape,), _) = read_apart(path, brep_contents if form is BREP else step_contents)
     return shape
+
+
+def read_named(path: str | os.PathLike[str]) -> tuple[Sequence[TopoDS_Shape], list[list[str]]]:
+    """Read the bodies of a user's STEP or BREP file, in millimetres, each with its names; of BREP there are none.
+
+    Raises
+    ------
+    ExportError
+        As of :func:`read_shape`.
+    """
+    if require_cad_file(path) is BREP:
+        shapes, _ = read_apart(path, brep_contents)
+        return shapes, [[] for _ in shapes]
+    return read_apart(path, bodies_of_step)
+
+
+def bodies_of_step(path: str) -> Contents:
+    """Read the bodies of a STEP file and their names, in this process."""
+    return read_bodies(path)
 
 
 def step_contents(path: str) -> Contents:

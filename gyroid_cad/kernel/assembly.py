@@ -1,9 +1,9 @@
-"""One solid in many places as a STEP assembly, with names and colours, through the kernel's document (XCAF)."""
+"""Assemblies of STEP files, with names and colours, through the kernel's document (XCAF): written, and read."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from OCP.gp import gp_Trsf, gp_Vec
@@ -15,28 +15,33 @@ from OCP.Quantity import (
     Quantity_NOC_RED,
     Quantity_NOC_YELLOW,
 )
-from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
 from OCP.STEPControl import STEPControl_AsIs
 from OCP.StepData import StepData_StepModel
-from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence
+from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
 from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
-from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
+from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.step import fill_header, product_name, step_of_kernel
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import LabelSequence
+from gyroid_cad.kernel.step import fill_header, product_name, reading_step, step_of_kernel
 
-__all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "write_assembly"]
+__all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 
 # Of those that STEP knows by name (draughting_pre_defined_colour), so that no reader rounds them.
 YELLOW, RED, GREEN = Quantity_NOC_YELLOW, Quantity_NOC_RED, Quantity_NOC_GREEN
 
+# What the kernel's writer calls a product that has no name; its occurrences it then numbers.
+_NAMELESS = "Open CASCADE STEP translator"
 # Of the document's unit of length, in metres: lengths are in mm.
 _MILLIMETRE = 1e-3
 _BINARY_DOCUMENT = "BinXCAF"
@@ -115,6 +120,61 @@ def new_document() -> TDocStd_Document:
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, _MILLIMETRE)
     return document
+
+
+def read_bodies(path: str | os.PathLike[str]) -> tuple[list[TopoDS_Shape], list[list[str]]]:
+    """Read the bodies of a STEP file, each where its assembly has it, in millimetres.
+
+    Returns
+    -------
+    shapes : list of TopoDS_Shape
+        The solids; of a product that has none, its faces.
+    names : list of list of str
+        Of each: that of the occurrence in its assembly, of its product, and its own if the product has several.
+
+    Raises
+    ------
+    ExportError
+        If the file is missing, not STEP, or holds no shape.
+    """
+    with reading_step():
+        reader, document = STEPCAFControl_Reader(), new_document()
+        if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
+            raise ExportError(f"{path} could not be read as STEP")
+    roots = LabelSequence()
+    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
+    own_names = reader.ChangeReader().WS().TransferReader()
+    shapes, names = [], []
+    for label, place, called in _leaves(roots, TopLoc_Location()):
+        shape = XCAFDoc_ShapeTool.GetShape_s(label)
+        solids = list(parts_of(shape, TopAbs_SOLID))
+        for solid in solids or [shape]:
+            entity = own_names.EntityFromShapeResult(solid, 1) if len(solids) > 1 else None
+            own = entity.Name().ToCString() if isinstance(entity, StepRepr_RepresentationItem) else ""
+            shapes.append(solid.Moved(place))
+            names.append([name for name in dict.fromkeys([*called, own]) if name])
+    if not shapes:
+        raise ExportError(f"{path} holds no shape")
+    return shapes, names
+
+
+def _leaves(labels: LabelSequence, place: TopLoc_Location) -> Iterator[tuple[TDF_Label, TopLoc_Location, list[str]]]:
+    """The products of assemblies that are none themselves, each with its place, and the occurrence's name and its."""
+    for number in range(1, labels.Length() + 1):
+        label, at, product, parts = labels.Value(number), place, labels.Value(number), LabelSequence()
+        if XCAFDoc_ShapeTool.IsReference_s(label):
+            at, product = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label)), TDF_Label()
+            XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
+        if XCAFDoc_ShapeTool.GetComponents_s(product, parts):
+            yield from _leaves(parts, at)
+        else:
+            names = [_named(label), _named(product)]
+            yield product, at, [] if names[1].startswith(_NAMELESS) else names
+
+
+def _named(label: TDF_Label) -> str:
+    name = TDataStd_Name()
+    return str(name.Get().ToExtString()) if label.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
 
 
 def _fill(document: TDocStd_Document, part: NamedPart, places: Iterable[Place], product: str) -> None:

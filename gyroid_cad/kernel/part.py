@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
@@ -30,14 +28,26 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
+from gyroid_cad.kernel.check import is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
-from gyroid_cad.kernel.extent import bounding_box, box_round
+from gyroid_cad.kernel.extent import bounding_box
+from gyroid_cad.kernel.repair import fault_of
+from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
-from gyroid_cad.mesh.triangles.measures import SignedDistances, unmatched_edges
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.trim.box import Box
 
-__all__ = ["Part", "measure", "require_part", "selected_faces"]
+__all__ = [
+    "AS_FAR",
+    "ON_FACE",
+    "OPENINGS",
+    "Part",
+    "face_numbers",
+    "measure",
+    "require_part",
+    "selected_faces",
+    "selected_way",
+]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -50,8 +60,6 @@ _ANGULAR_DEFLECTION = 0.5
 _INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
 _BOX_FACES, _BOX_CORNERS = 6, 8
-# Of two solids, in parts of the smaller one: less may be rounding, where they touch in a line.
-_SHARED = 1e-6
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
 
@@ -141,7 +149,7 @@ class Part:
 
 
 def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
-    """The solids of a shape, if they are closed, valid and the right way out.
+    """The solids of a shape, which have no space in common, if they are closed, valid and the right way out.
 
     Raises
     ------
@@ -154,37 +162,14 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
     if not solids:
         raise ParameterError(parameter, kind, "a closed solid: there is none in it")
-    volumes = []
     for index, solid in enumerate(solids, 1):
-        which = "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"
-        if open_edges := topology(solid).open_edges:
-            raise ParameterError(parameter, kind, f"a closed solid: {which} has {open_edges} open edges")
-        if not is_valid(solid):
-            raise ParameterError(parameter, kind, f"a valid solid: the kernel finds fault with {which}")
-        volumes.append(measure(solid)[0])
-        if not volumes[-1] > 0:
-            raise ParameterError(parameter, kind, f"a solid of positive volume: {which} is inside out")
-    _require_apart(solids, parameter, kind)
+        if fault := fault_of(solid, "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"):
+            raise ParameterError(parameter, kind, fault)
     low, high = bounding_box(shape)
+    volume = sum(measure(solid)[0] for solid in solids)
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, low, high, sum(volumes), _box_of(solids))
-
-
-def _require_apart(solids: Sequence[TopoDS_Solid], parameter: str, kind: str) -> None:
-    """Refuse solids that have space or faces in common: the boundary of what they take up is then none of theirs."""
-    boxes = [box_round([solid]) for solid in solids]
-    for first, second in combinations(range(len(solids)), 2):
-        if boxes[first].IsOut(boxes[second]):
-            continue
-        pair = [solids[first], solids[second]]
-        common = measure(BRepAlgoAPI_Common(*pair).Shape())[0]
-        touching = measure(BRepAlgoAPI_Common(*(compound_of(parts_of(one, TopAbs_FACE)) for one in pair)).Shape())[1]
-        volume, area = (min(sizes) for sizes in zip(*map(measure, pair), strict=True))
-        amount = f"{common:.4g} mm3" if common > _SHARED * volume else f"{touching:.4g} mm2 of their faces"
-        if common > _SHARED * volume or touching > _SHARED * area:
-            which = f"solids {first + 1} and {second + 1} of {len(solids)} have {amount} in common"
-            raise ParameterError(parameter, kind, f"solids that neither overlap nor touch: {which}; fuse them first")
+    return Part(divided, solids, low, high, volume, _box_of(solids))
 
 
 def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
@@ -224,22 +209,6 @@ def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
     return shape if divided is None or divided.IsNull() or not is_valid(divided) else divided
 
 
-# Relative, as the kernel estimates it: far above what it comes to.
-_MEASURE = 1e-4
-
-
-def measure(shape: TopoDS_Shape) -> tuple[float, float]:
-    """Volume in mm3 and surface area in mm2 (``BRepGProp``), either off by some 1e-7 of it.
-
-    Integrated adaptively: the kernel's rule of a fixed order is off by up to 6e-5 on a lattice's faces, and takes three
-    to eight times as long.
-    """
-    volume, area = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, volume, _MEASURE)
-    BRepGProp.SurfaceProperties_s(shape, area, _MEASURE)
-    return float(volume.Mass()), float(area.Mass())
-
-
 def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
     """Corners of the triangles of each meshed face, anticlockwise from outside: three arrays (triangles, 3)."""
     for part in parts_of(shape, TopAbs_FACE):
@@ -275,9 +244,9 @@ def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Fl
     return points, np.concatenate(directions)[first]
 
 
-_ACCEPTED = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'
+OPENINGS = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'
 # In parts of the part's largest extent.
-_AS_FAR, _ON_FACE = 1e-6, 1e-3
+AS_FAR, ON_FACE = 1e-6, 1e-3
 
 
 def selected_faces(part: Part, openings: Sequence[Any]) -> list[TopoDS_Face]:
@@ -295,8 +264,30 @@ def selected_faces(part: Part, openings: Sequence[Any]) -> list[TopoDS_Face]:
     ParameterError
     """
     if isinstance(openings, str) or not isinstance(openings, Iterable):
-        raise ParameterError("openings", openings, f"a sequence of {_ACCEPTED}")
+        raise ParameterError("openings", openings, f"a sequence of {OPENINGS}")
     return [face for given in openings for face in _selected(part, given)]
+
+
+def face_numbers(shape: TopoDS_Shape, openings: Sequence[Any]) -> list[int]:
+    """Numbers of chosen faces, as :func:`gyroid_cad.kernel.stl.solid_triangles` counts them.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    openings : sequence
+        As of :func:`selected_faces`.
+
+    Raises
+    ------
+    ParameterError
+    """
+    low, high = bounding_box(shape)
+    chosen = selected_faces(Part(shape, (), low, high, 0.0), openings)
+    faces = [face for solid in parts_of(shape, TopAbs_SOLID) for face in parts_of(solid, TopAbs_FACE)]
+    numbers = [number for number, face in enumerate(faces) if any(face.IsSame(other) for other in chosen)]
+    if chosen and not numbers:
+        raise ParameterError("openings", openings, "faces of the part that is filled")
+    return numbers
 
 
 def _selected(part: Part, given: Any) -> list[TopoDS_Face]:
@@ -307,23 +298,32 @@ def _selected(part: Part, given: Any) -> list[TopoDS_Face]:
     if isinstance(shape, TopoDS_Shape):
         found = [] if shape.IsNull() else [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
         if not found:
-            raise ParameterError("openings", given, _ACCEPTED)
+            raise ParameterError("openings", given, OPENINGS)
         return found
     try:
         point = three_numbers("openings", given)
     except ParameterError:
-        raise ParameterError("openings", given, _ACCEPTED) from None
+        raise ParameterError("openings", given, OPENINGS) from None
     return [_nearest(part, faces, point)]
 
 
 def _furthest(part: Part, faces: list[TopoDS_Face], selector: str) -> list[TopoDS_Face]:
+    sign, axis = selected_way(selector)
+    reach = sign * np.array([_centre(face)[axis] for face in faces])
+    limit = reach.max() - AS_FAR * float(np.max(part.high - part.low))
+    return [faces[index] for index in np.flatnonzero(reach >= limit).tolist()]
+
+
+def selected_way(selector: str) -> tuple[float, int]:
+    """Sign and axis of a selector; raises ParameterError.
+
+    >>> selected_way(">Z"), selected_way("<X")
+    ((1.0, 2), (-1.0, 0))
+    """
     text = selector.strip().upper()
     if len(text) != 2 or text[0] not in "<>" or text[1] not in "XYZ":
-        raise ParameterError("openings", selector, _ACCEPTED)
-    sign = 1.0 if text[0] == ">" else -1.0
-    reach = sign * np.array([_centre(face)["XYZ".index(text[1])] for face in faces])
-    limit = reach.max() - _AS_FAR * float(np.max(part.high - part.low))
-    return [faces[index] for index in np.flatnonzero(reach >= limit).tolist()]
+        raise ParameterError("openings", selector, OPENINGS)
+    return 1.0 if text[0] == ">" else -1.0, "XYZ".index(text[1])
 
 
 def _centre(face: TopoDS_Face) -> tuple[float, float, float]:
@@ -343,7 +343,7 @@ def _nearest(part: Part, faces: list[TopoDS_Face], point: Floats) -> TopoDS_Face
     # Of a point much too far off the kernel finds no distance.
     distances = [found.Value() if found.IsDone() else np.inf for found in searches]
     nearest = int(np.argmin(distances))
-    if distances[nearest] > _ON_FACE * float(np.max(part.high - part.low)):
+    if distances[nearest] > ON_FACE * float(np.max(part.high - part.low)):
         shown = tuple(point.tolist())
         raise ParameterError("openings", shown, f"a point on a face; {_away(distances[nearest])}")
     return faces[nearest]

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.BOPAlgo import BOPAlgo_Builder
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepTools import BRepTools_ReShape
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
@@ -23,11 +24,12 @@ from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.split import Change, Pieces, inner_sides, modified, solids_of
+from gyroid_cad.kernel.split import Change, Pieces, general_fuse, inner_sides, modified, solids_of
 
-__all__ = ["Hollow", "hollow", "openings_of"]
+__all__ = ["Hollow", "has_face", "hollow", "hollow_round", "openings_of"]
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +38,8 @@ _SAME_PLACE = 1e-5
 _POINTS_ON_FACE, _POINTS_ON_EDGE, _POINTS_ON_OPENING = 8, 5, 128
 # The kernel measures faces with wavy borders no closer.
 _SAME_VOLUME = 1e-3
+# Of a core's volume: what sticks out of the part by less is rounding of a file.
+_SAME_CORE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,11 +54,14 @@ class Hollow:
     core : Part
     opened : tuple of bool
         Which of the core's faces lie in openings, as they are found in its shape; the others are shared with the skin.
+    thickness : float, optional
+        Of the skin where it is thinnest, in mm; None round a core that comes to every face of the part.
     """
 
     skin: tuple[TopoDS_Face, ...]
     core: Part
     opened: tuple[bool, ...]
+    thickness: float | None
 
     def solids(
         self, pieces: Pieces, whole: Iterable[TopoDS_Shape], wanted_at: Callable[[Floats], bool]
@@ -123,8 +130,70 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
     ]
     core = require_part(compound_of(cores))
     if opened:
-        return _sharing(part, core, opened)
-    return Hollow(tuple(_faces_of(part.shape)), core, len(_faces_of(core.shape)) * (False,))
+        return _sharing(part, core, opened, skin)
+    return Hollow(tuple(_faces_of(part.shape)), core, len(_faces_of(core.shape)) * (False,), skin)
+
+
+def hollow_round(part: Part, core: Part) -> Hollow:
+    """Part a part into a given core and the skin round it, which is open wherever the core comes to the boundary.
+
+    Parameters
+    ----------
+    part, core : Part
+
+    Raises
+    ------
+    ParameterError
+        If the core isn't inside the part, or leaves no skin.
+    KernelError
+        If the kernel fails.
+    """
+    fuse = general_fuse(part.shape, core.shape)
+    of_part = _set_of(image for solid in part.solids for image in modified(fuse, solid))
+    images = [as_solid(image) for solid in core.solids for image in modified(fuse, solid)]
+    _require_inside([image for image in images if not of_part.Contains(image)], part, core.volume)
+    images = [image for image in images if of_part.Contains(image)]
+    faces = [face for image in images for face in _faces_of(image)]
+    inner = _set_of(faces)
+    pieces = [[as_face(piece) for piece in modified(fuse, face)] for face in _faces_of(part.shape)]
+    own = _set_of(piece for some in pieces for piece in some)
+    opened = tuple(own.Contains(face) for face in faces)
+    skin = tuple(piece for some in pieces for piece in some if not inner.Contains(piece))
+    if all(opened):
+        raise ParameterError("core", f"{core.volume:.6g} mm3", "less than the whole part, so that a skin is left")
+    kept = [piece for some in pieces if not any(inner.Contains(piece) for piece in some) for piece in some]
+    walls = [face for face, is_open in zip(faces, opened, strict=True) if not is_open]
+    core = replace(core, shape=compound_of(images), solids=tuple(images), box=None if any(opened) else core.box)
+    made = Hollow(skin, core, opened, _distance(walls, kept))
+    _require_all_of(part, made)
+    return made
+
+
+def _set_of(shapes: Iterable[TopoDS_Shape]) -> ShapeSet:
+    made = ShapeSet()
+    for shape in shapes:
+        made.Add(shape)
+    return made
+
+
+def _distance(some: Sequence[TopoDS_Face], others: Sequence[TopoDS_Face]) -> float | None:
+    """Smallest distance between faces, in mm; None where there are none."""
+    if not others:
+        return None
+    return float(BRepExtrema_DistShapeShape(compound_of(some), compound_of(others)).Value())
+
+
+def _require_inside(others: Sequence[TopoDS_Solid], part: Part, volume: float) -> None:
+    """Raise if pieces of a core that are no pieces of the part are more than rounding."""
+    outside = [BRepAlgoAPI_Cut(piece, part.shape).Shape() for piece in others]
+    sizes = [measure(piece)[0] for piece in outside]
+    if sum(sizes) > _SAME_CORE * volume:
+        low, high = bounding_box(outside[int(np.argmax(sizes))])
+        place = ", ".join(f"{coordinate:.4g}" for coordinate in ((low + high) / 2).tolist())
+        amount = f"{sum(sizes):.4g} of its {volume:.6g} mm3 stick out, most of it round ({place})"
+        raise ParameterError("core", f"{volume:.6g} mm3", f"a solid inside the part: {amount}")
+    if sum(measure(piece)[0] for piece in others) > _SAME_CORE * volume:
+        raise KernelError("the kernel could not part the part into its core and the skin round it")
 
 
 def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
@@ -149,6 +218,12 @@ def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
             raise ParameterError("openings", _shown(given), "faces of the part")
         found |= same
     return [faces[k] for k in sorted(found)]
+
+
+def has_face(part: Part, face: TopoDS_Face) -> bool:
+    """Tell whether a face is one of the part's, or has some of these lying on it."""
+    faces = _faces_of(part.shape)
+    return any(own.IsSame(face) for own in faces) or bool(_lying_on(face, faces))
 
 
 def _lying_on(given: TopoDS_Shape, faces: Sequence[TopoDS_Face]) -> set[int]:
@@ -187,20 +262,12 @@ def _shown(given: Sequence[TopoDS_Shape]) -> str:
     return f"{len(given)} face{'s' if len(given) != 1 else ''}"
 
 
-def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face]) -> Hollow:
+def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face], skin: float) -> Hollow:
     """Skin and core of a part with openings, once the part's faces there are split where the core comes to them."""
-    fuse = BOPAlgo_Builder()
-    fuse.SetNonDestructive(True)
-    fuse.AddArgument(part.shape)
-    fuse.AddArgument(core.shape)
-    fuse.Perform()
-    if fuse.HasErrors():
-        raise KernelError("the kernel could not part the skin from its core at the openings")
+    fuse = general_fuse(part.shape, core.shape)
     solids = [as_solid(image) for solid in core.solids for image in modified(fuse, solid)]
     core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
-    inner, ends = ShapeSet(), ShapeSet()
-    for face in _faces_of(core.shape):
-        inner.Add(face)
+    inner, ends = _set_of(_faces_of(core.shape)), ShapeSet()
     for opening in openings:
         found = [image for image in modified(fuse, opening) if inner.Contains(image)]
         if not found:
@@ -208,8 +275,8 @@ def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face]) -> Hollow:
         for image in found:
             ends.Add(image)
     pieces = (as_face(piece) for face in _faces_of(part.shape) for piece in modified(fuse, face))
-    skin = tuple(piece for piece in pieces if not inner.Contains(piece))
-    made = Hollow(skin, core, tuple(bool(ends.Contains(face)) for face in _faces_of(core.shape)))
+    own = tuple(piece for piece in pieces if not inner.Contains(piece))
+    made = Hollow(own, core, tuple(bool(ends.Contains(face)) for face in _faces_of(core.shape)), skin)
     _require_all_of(part, made)
     return made
 

@@ -38,6 +38,7 @@ __all__ = [
     "no_messages",
     "product_name",
     "read_step",
+    "reading_step",
     "step_of_kernel",
     "topology_in_step",
     "write_step",
@@ -277,8 +278,7 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     ExportError
         If the file is missing, not STEP, or holds no shape.
     """
-    STEPControl_Reader()
-    with no_messages(), _kernel_settings(_OF_LENGTHS):
+    with reading_step():
         reader = STEPControl_Reader()
         if reader.ReadFile(str(path)) != IFSelect_RetDone:
             raise ExportError(f"{path} could not be read as STEP")
@@ -287,6 +287,15 @@ def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:
     if shape.IsNull():
         raise ExportError(f"{path} holds no shape")
     return shape
+
+
+@contextmanager
+def reading_step() -> Iterator[None]:
+    """Have the kernel read lengths in millimetres, and say nothing."""
+    # The first reader of a process registers the settings.
+    STEPControl_Reader()
+    with no_messages(), _kernel_settings(_OF_LENGTHS):
+        yield
 
 
 def fill_header(writer: STEPControl_Writer, product: str) -> None:

@@ -1,4 +1,4 @@
-"""Islands: pieces that a cut leaves unconnected to the largest one. Which are kept, and what is said of them."""
+"""Islands, pieces that a cut leaves unconnected to the largest one, and sealed voids: what is kept, what is said."""
 
 from __future__ import annotations
 
@@ -9,15 +9,29 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
-from gyroid_cad.errors import IslandsWarning, ParameterError
+from gyroid_cad.common.arrays import Point
+from gyroid_cad.errors import IslandsWarning, ParameterError, SealedVoidsWarning
 
-__all__ = ["SMALL_ISLAND", "IslandRule", "Islands", "island_rule", "islands_of", "kept_pieces"]
+__all__ = [
+    "SMALL_ISLAND",
+    "IslandRule",
+    "Islands",
+    "SealedVoid",
+    "island_rule",
+    "islands_of",
+    "kept_pieces",
+    "speck_below",
+    "warn_caller",
+    "warn_of_voids",
+]
 
 IslandRule = Literal["drop small", "drop all", "keep all"]
 
 # A small island has less than this part of what one cell holds, and of the largest piece. The chips at two corners of
 # a block of whole cells have a quarter of that where walls are thickest, and a tenth at usual densities.
 SMALL_ISLAND = 0.01
+# What is smaller is no void, in mm3 and in parts of a cell: a chip in a corner, far below what anything can make.
+_SPECK, _SPECK_OF_CELL = 1e-4, 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +66,7 @@ class Islands:
             said.append(f"{_counted(self.kept)}, {self.kept_volume:.4g} mm3 in all: left{remedy and f' ({remedy})'}")
         if said:
             text = "not connected to the largest piece: " + "; ".join(said)
-            warnings.warn(text, IslandsWarning, stacklevel=_levels_within())
+            warn_caller(text, IslandsWarning)
 
 
 def island_rule(keep_islands: bool, drop_islands: bool = False) -> IslandRule:
@@ -109,10 +123,47 @@ def _counted(number: int) -> str:
     return "1 island" if number == 1 else f"{number} islands"
 
 
-def _levels_within() -> int:
-    """Levels of the stack from a warning's own function to the first that is not of this package."""
+@dataclass(frozen=True, slots=True)
+class SealedVoid:
+    """Space that a solid encloses: its volume in mm3, and its centre of mass in mm."""
+
+    volume: float
+    place: Point
+
+    def __str__(self) -> str:
+        place = ", ".join(f"{round(coordinate, 3) + 0.0:g}" for coordinate in self.place)
+        return f"{self.volume:.4g} mm3 round ({place})"
+
+
+def speck_below(cell_size: float) -> float:
+    """Volume in mm3 below which space that is enclosed is no void, where cells have a size in mm.
+
+    Examples
+    --------
+    >>> speck_below(2.0), speck_below(0.1)
+    (0.0001, 1e-05)
+    """
+    cell = cell_size**3
+    return round(min(max(_SPECK, _SPECK_OF_CELL * cell), SMALL_ISLAND * cell), 15)
+
+
+def warn_of_voids(voids: Sequence[SealedVoid]) -> None:
+    """Emit a :class:`~gyroid_cad.errors.SealedVoidsWarning` at the line that called this package, if there is any void.
+
+    Examples
+    --------
+    >>> warn_of_voids([])
+    """
+    if voids:
+        counted = "1 void" if len(voids) == 1 else f"{len(voids)} voids"
+        text = f"{counted} that no opening reaches, the largest {max(voids, key=lambda void: void.volume)}"
+        warn_caller(text, SealedVoidsWarning)
+
+
+def warn_caller(text: str, category: type[Warning]) -> None:
+    """Emit a warning at the line that called this package."""
     package = __name__.partition(".")[0]
-    level, frame = 1, sys._getframe(1)
+    level, frame = 1, sys._getframe(0)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
-    return level
+    warnings.warn(text, category, stacklevel=level)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +11,15 @@ from types import SimpleNamespace
 
 import cadquery as cq
 import pytest
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Pnt
 
 from gyroid_cad.cli.app import main
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
@@ -338,6 +342,22 @@ def test_a_part_that_a_file_names_wrongly_is_told_by_the_files_line(capsys: Capt
     assert failed.status != 0
     assert len(failed.err.splitlines()) == 1
     assert "part.iges" in failed.err
+
+
+def test_a_core_from_a_file_and_the_voids_it_leaves_are_told(capsys: Captured, block: Path, tmp_path: Path) -> None:
+    low, high = bounding_box(read_step(block))
+    core = BRepPrimAPI_MakeBox(gp_Pnt(*(low + 0.5).tolist()), gp_Pnt(*(high - 0.5).tolist())).Shape()
+    write_step(core, tmp_path / "inner.step")
+    asked = [*FILL, "--density", "0.3", "--core", tmp_path / "inner.step"]
+    done = run(capsys, block, "-o", tmp_path / "a.step", *asked)
+    assert done.status == 0
+    assert re.search(r"skin +0\.5 mm", done.out)
+    assert "that no opening reaches" in done.out
+    refused = run(capsys, block, "-o", tmp_path / "inner.step", *asked)
+    assert refused.status == 2
+    assert "expected another file" in refused.err
+    both = run(capsys, block, "-o", tmp_path / "b.step", *asked, "--skin", "1")
+    assert "--skin = 1.0: expected none beside a core" in both.err
 
 
 def test_the_part_itself_is_not_overwritten(capsys: Captured, block: Path, tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ import build123d as bd
 import cadquery as cq
 import numpy as np
 import pytest
-from OCP.TopAbs import TopAbs_FACE
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
 from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial.transform import Rotation
 
 import gyroid_cad.filling.part
 import gyroid_cad.kernel.regions
-from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError
+from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError, SealedVoidsWarning
 from gyroid_cad.filling.fill import Filled, fill
 from gyroid_cad.filling.part import Filling, part_of
 from gyroid_cad.filling.wanted import KINDS
@@ -42,12 +42,6 @@ def peg(x: float = 5.0) -> cq.Workplane:
 def ball() -> cq.Workplane:
     """The kernel takes some time to tell what is inside one."""
     return cq.Workplane(origin=(5.0, 4.0, 6.0)).sphere(2.2)
-
-
-def two_boxes(apart: float) -> cq.Workplane:
-    """Two cubes of 4 mm, one so far along x from the other."""
-    boxes = [cq.Workplane().box(4, 4, 4).translate((x, 0, 0)).val() for x in (0, apart)]
-    return cq.Workplane(cq.Compound.makeCompound(boxes))
 
 
 @lru_cache(maxsize=8)
@@ -117,11 +111,11 @@ def test_parts_of_any_host_and_of_files_are_the_same_part(tmp_path: Path) -> Non
 
 
 def test_islands_are_counted_and_dropped_on_request() -> None:
-    two = peg().add(peg(5.0 + 3 * RADIUS))
+    plate = cq.Workplane().box(6, 6, 1, centered=False)
     with pytest.warns(IslandsWarning, match=r"left \(drop_islands drops\)"):
-        both = fill(two, CELL, WALL, fit=COARSE).report
+        both = fill(plate, 8, density=0.2, fit=COARSE).report
     with pytest.warns(IslandsWarning, match=r"dropped \(keep_islands keeps\)"):
-        one = fill(two, CELL, WALL, fit=COARSE, drop_islands=True).report
+        one = fill(plate, 8, density=0.2, fit=COARSE, drop_islands=True).report
     assert (both.islands, both.dropped) == (both.solids - 1, 0)
     assert both.islands >= 1
     assert (one.islands, one.dropped, one.solids) == (0, both.islands, 1)
@@ -325,8 +319,6 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"skin": 0.4, "openings": [(1e300, 0, 0)]}, "a point on a face; none is anywhere near"),
         ({"material_density": 7850}, "g/cm3, at most 100: of water it is 1"),
         ({"lattice": Lattice((1, 1, 1), 10, 1, scale_field=1e300), "cell_size": None, "thickness": None}, "at most 1"),
-        ({"part": two_boxes(2)}, "solids 1 and 2 of 2 have 32 mm3 in common; fuse them first"),
-        ({"part": two_boxes(4)}, "solids 1 and 2 of 2 have 16 mm2 of their faces in common; fuse them first"),
         ({"material_density": -1}, "material_density = -1"),
         ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's smallest extent, 0.5 mm"),
     ],
@@ -394,3 +386,47 @@ def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.Mo
     monkeypatch.setattr(gyroid_cad.filling.part, "bounded_solids", lambda *arguments: solids)
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(peg(), CELL, WALL, fit=COARSE)
+
+
+def test_voids_that_a_skin_seals_are_counted_with_place_and_volume_and_warned_of() -> None:
+    with pytest.warns(SealedVoidsWarning, match="4 voids that no opening reaches, the largest"):
+        sealed = fill(cq.Workplane().box(10, 8, 8), CELL, density=0.3, skin=1.0, fit=COARSE)
+    assert len(sealed.report.voids) == 4
+    sealed_volume = sum(void.volume for void in sealed.report.voids)
+    assert sealed_volume == pytest.approx(10 * 8 * 8 - sealed.report.volume, rel=1e-4)
+    assert "sealed voids   4 that no opening reaches: " in str(sealed)
+    assert [void["volume"] for void in sealed.report.as_dict()["voids"]] == [v.volume for v in sealed.report.voids]
+
+
+def test_chips_of_void_in_a_corner_are_closed_and_the_report_holds_the_rest() -> None:
+    with pytest.warns(SealedVoidsWarning, match="2 voids"):
+        sealed = fill(cq.Workplane().box(18, 10, 10), 8, density=0.3, skin=1.0, fit=COARSE)
+    assert measure(sealed.solid()) == pytest.approx((sealed.report.volume, sealed.report.area), rel=1e-6)
+    assert len(list(parts_of(sealed.solid(), TopAbs_SHELL))) == 1 + len(sealed.report.voids)
+
+
+def test_a_core_of_the_users_own_is_filled_and_the_rest_is_skin(tmp_path: Path) -> None:
+    core = cq.Workplane().box(8, 6, 7).translate((0, 0, 0.5))
+    write_step(core.val().wrapped, tmp_path / "inner.step")
+    made = fill(cq.Workplane().box(10, 8, 8), CELL, density=0.3, core=tmp_path / "inner.step", fit=COARSE)
+    assert made.report.skin == pytest.approx(1.0)
+    assert [void.volume < 1.0 for void in made.report.voids] == [True]
+    assert made.report.min_wall < 1.0
+    assert made.report.volume == pytest.approx(10 * 8 * 8 - 0.7 * 8 * 6 * 7, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"skin": 1.0}, "skin = 1.0: expected none beside a core"),
+        ({"openings": [">Z"]}, "openings = ['>Z']: expected none beside a core"),
+        ({"kind": "surface", "density": None}, "expected none round the bare surface"),
+        ({"core": "no solid"}, "no solid could not be read"),
+        ({"core": 3.0}, "core = 3.0: expected a shape"),
+    ],
+)
+def test_what_does_not_go_with_a_core_is_refused(given: dict[str, Any], words: str) -> None:
+    settings = {"density": 0.3, "core": cq.Workplane().box(2, 2, 2), **given}
+    with pytest.raises((ParameterError, ExportError)) as caught:
+        fill(cq.Workplane().box(4, 4, 4), CELL, **settings)
+    assert words in str(caught.value)

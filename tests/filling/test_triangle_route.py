@@ -6,13 +6,16 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Pnt
 
-from gyroid_cad import FilledTriangles, IslandsWarning, Lattice, ParameterError, fill
+from gyroid_cad import FilledTriangles, Lattice, ParameterError, fill
+from gyroid_cad.errors import PartWarning, SealedVoidsWarning
 from gyroid_cad.kernel.brep import write_brep
+from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.surface.families import USUAL
 
 CELL, DEVIATION = 6.0, 0.02
@@ -29,7 +32,7 @@ def box(*sides: float) -> Any:
 def filled(part: Any, **given: Any) -> FilledTriangles:
     usual = {"cell_size": CELL, "density": 0.3, "route": "triangles", "deviation": DEVIATION}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IslandsWarning)
+        warnings.simplefilter("ignore")
         made: Any = fill(part, **{**usual, **given})
     return made
 
@@ -81,7 +84,7 @@ def test_both_routes_fill_a_box_alike() -> None:
     part = box(7.0, 6.0, 5.0)
     given = {"cell_size": CELL, "density": "0.2 + 0.02*x", "origin": (1.0, 2.0, 3.0), "rotation": (10.0, 20.0, 30.0)}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IslandsWarning)
+        warnings.simplefilter("ignore")
         exact = fill(part, **given).report  # type: ignore[arg-type]
     made = filled(part, **given).report
     assert made.volume == pytest.approx(exact.volume, rel=2e-3)
@@ -140,3 +143,65 @@ def test_no_step_file_comes_of_triangles(tmp_path: Path) -> None:
 def test_a_brep_part_is_written_by_name(tmp_path: Path) -> None:
     write_brep(ball(), tmp_path / "ball.brep")
     assert filled(tmp_path / "ball.brep").report.volume == pytest.approx(filled(ball()).report.volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("openings", [[], [">Z"], [(3.0, 4.0, 8.0)]])
+def test_a_skin_of_a_box_is_that_of_a_smaller_box_open_where_it_is_asked_to_be(openings: list[Any]) -> None:
+    sides, skin = np.array([6.0, 7.0, 8.0]), 0.8
+    made = filled(box(*sides), skin=skin, openings=openings, kind="channels", keep_islands=True)
+    low, high = np.full(3, skin), sides - skin
+    if openings:
+        high[2] = sides[2]
+    core = filled(BRepPrimAPI_MakeBox(gp_Pnt(*low), gp_Pnt(*high)).Shape(), kind="channels", keep_islands=True)
+    assert made.report.volume == pytest.approx(core.report.volume, rel=1e-4)
+    solid = filled(box(*sides), skin=skin, openings=openings)
+    assert solid.report.volume + made.report.volume == pytest.approx(float(np.prod(sides)), rel=1e-4)
+    assert bool(solid.report.voids) == (not openings)
+
+
+def test_a_skin_round_a_ball_keeps_within_the_deviation() -> None:
+    made = filled(ball(6.0), skin=1.0, kind="channels", keep_islands=True)
+    core = filled(ball(5.0), kind="channels", keep_islands=True)
+    assert made.report.volume == pytest.approx(core.report.volume, rel=5e-3)
+    # Its triangles' corners may lie beyond the inner side by the deviations of the ball and of the side.
+    reach = np.linalg.norm(made.vertices - [1.0, 2.0, 3.0], axis=1).max()
+    assert reach == pytest.approx(5.0, abs=2 * DEVIATION)
+
+
+def test_the_voids_of_a_skin_are_counted_and_warned_of_and_the_skin_may_be_too_thick() -> None:
+    with pytest.warns(SealedVoidsWarning, match="2 voids that no opening reaches"):
+        report = fill(ball(), CELL, density=0.3, route="triangles", deviation=0.05, skin=1.0).report
+    assert len(report.voids) == 2
+    with pytest.raises(ParameterError, match=r"skin = 7.0: expected below about (5\.\d|6)"):
+        filled(ball(), skin=7.0)
+
+
+def test_a_skin_of_triangles_opens_at_the_flat_region_that_is_meant(tmp_path: Path) -> None:
+    trimesh.creation.box(bounds=[[0, 0, 0], [6, 7, 8]]).export(tmp_path / "part.stl")
+    expected = filled(box(6.0, 7.0, 8.0), skin=0.8, openings=[">Z"]).report.volume
+    for opening in (">Z", (3.0, 3.0, 8.0)):
+        made = filled(tmp_path / "part.stl", skin=0.8, openings=[opening])
+        assert made.report.volume == pytest.approx(expected, rel=1e-5)
+    with pytest.raises(ParameterError, match="the nearest is 2 mm away"):
+        filled(tmp_path / "part.stl", skin=0.8, openings=[(3.0, 3.0, 10.0)])
+
+
+def test_a_core_of_the_users_own_leaves_the_skin_that_is_round_it() -> None:
+    inner = BRepPrimAPI_MakeBox(gp_Pnt(0.5, 0.7, 0.9), gp_Pnt(5.5, 6.3, 8.0)).Shape()
+    made = filled(box(6.0, 7.0, 8.0), core=inner)
+    assert made.report.skin == pytest.approx(0.5, abs=1e-6)
+    core = filled(inner, kind="channels", keep_islands=True).report.volume
+    assert made.report.volume + core == pytest.approx(336.0, rel=1e-4)
+    with pytest.raises(ParameterError, match="a solid inside the part; it is 1 mm outside"):
+        filled(box(6.0, 7.0, 7.0), core=inner)
+
+
+def test_bodies_are_filled_each_by_itself_and_those_that_overlap_are_united() -> None:
+    apart = compound_of([box(4.0, 4.0, 4.0), BRepPrimAPI_MakeBox(gp_Pnt(9.0, 0.0, 0.0), 4.0, 4.0, 4.0).Shape()])
+    made = filled(apart)
+    assert (made.report.bodies, made.report.part_volume) == (2, pytest.approx(128.0))
+    overlapping = compound_of([box(4.0, 4.0, 4.0), BRepPrimAPI_MakeBox(gp_Pnt(2.0, 1.0, 1.0), 4.0, 4.0, 4.0).Shape()])
+    with pytest.warns(PartWarning, match="2 solids have 18 mm3 in common: united"):
+        united = fill(overlapping, CELL, density=0.3, route="triangles", deviation=0.05)
+    assert united.report.part_volume == pytest.approx(110.0)
+    assert united.report.bodies == 1

@@ -26,7 +26,7 @@ from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.skin import Hollow, hollow, openings_of
+from gyroid_cad.kernel.skin import Hollow, hollow, hollow_round, openings_of
 from gyroid_cad.kernel.solid import build_faces
 from gyroid_cad.kernel.split import bounded_solids, split
 from gyroid_cad.kernel.step import read_step, write_step
@@ -288,3 +288,51 @@ def test_one_way_that_fails_does_not_keep_the_next_from_being_tried() -> None:
 def test_a_part_is_as_deep_as_the_largest_ball_in_it() -> None:
     (solid,) = require_part(wrapped(plate())).solids
     assert Depths(solid, []).deepest(10.0) == pytest.approx(3.0, rel=0.01)
+
+
+def inner(*moves: float) -> bd.Part:
+    """A block for the box's inside, moved."""
+    return bd.Pos(*moves) * box(7, 6, 5)
+
+
+@pytest.mark.parametrize(
+    ("made", "core", "opened", "thickness"),
+    [
+        (box(), inner(), 0, 1.0),
+        (box(), inner(0.5), 0, 0.5),
+        (box(), inner(0, 0, 1), 1, 1.0),
+        (ball(), bd.Pos(5, 5, 5) * bd.Box(1, 1, 4), 0, RADIUS - np.sqrt(2**2 + 2 * 0.5**2)),
+        (ball(), bd.Pos(5, 5, 5) * bd.Rot(0, 90, 0) * bd.Cylinder(1, 9) & ball(), 4, None),
+        (box() - ball(1.0), inner() - ball(1.5), 0, 0.5),
+    ],
+    ids=["inside", "aside", "to the top", "in a ball", "through a ball", "round a void"],
+)
+def test_a_given_core_and_the_skin_round_it_are_the_part(
+    made: bd.Shape, core: bd.Shape, opened: int, thickness: float | None
+) -> None:
+    part, given = require_part(wrapped(made)), require_part(wrapped(core))
+    found = hollow_round(part, given)
+    skin = with_nothing_in_it(found)
+    assert_sound(compound_of(skin))
+    assert sum(found.opened) == opened
+    assert found.thickness == (None if thickness is None else pytest.approx(thickness, abs=1e-6))
+    assert volume(skin) == pytest.approx(part.volume - given.volume, rel=1e-6)
+    everything = with_nothing_in_it(found, True)
+    assert_sound(compound_of(everything))
+    assert volume(everything) == pytest.approx(part.volume, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("core", "words"),
+    [
+        (inner(2), "30 of its 210 mm3 stick out, most of it round (10, 5, 5)"),
+        (inner(20), "210 of its 210 mm3 stick out, most of it round (25, 5, 5)"),
+        (box(), "less than the whole part"),
+        (box(12, 12, 12), "stick out"),
+    ],
+)
+def test_a_core_that_is_not_inside_is_refused_with_what_sticks_out(core: bd.Shape, words: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        hollow_round(require_part(wrapped(box())), require_part(wrapped(core)))
+    assert words in str(caught.value)
+    assert caught.value.parameter == "core"

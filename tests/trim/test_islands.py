@@ -6,8 +6,17 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
-from gyroid_cad.errors import IslandsWarning, ParameterError
-from gyroid_cad.trim.islands import SMALL_ISLAND, Islands, island_rule, islands_of, kept_pieces
+from gyroid_cad.errors import IslandsWarning, ParameterError, SealedVoidsWarning
+from gyroid_cad.trim.islands import (
+    SMALL_ISLAND,
+    Islands,
+    SealedVoid,
+    island_rule,
+    islands_of,
+    kept_pieces,
+    speck_below,
+    warn_of_voids,
+)
 
 volumes = st.lists(st.floats(1e-6, 1e6), min_size=1, max_size=12)
 cells = st.floats(1e-3, 1e6)
@@ -62,3 +71,16 @@ def test_the_warning_points_at_the_line_outside_this_package_that_caused_it() ->
 def test_without_islands_there_is_no_warning(recwarn: pytest.WarningsRecorder) -> None:
     Islands().warn()
     assert not recwarn.list
+
+
+def test_the_warning_of_sealed_voids_counts_them_and_says_where_the_largest_is() -> None:
+    with pytest.warns(
+        SealedVoidsWarning, match=r"2 voids that no opening reaches, the largest 3 mm3 round \(1, 2, 3\)"
+    ) as seen:
+        warn_of_voids([SealedVoid(0.5, (0.0, 0.0, 0.0)), SealedVoid(3.0, (1.0, 2.0, 3.0))])
+    assert seen[0].filename == __file__
+
+
+@given(st.floats(1e-3, 1e3))
+def test_a_speck_is_small_beside_a_cell_whatever_its_size(cell_size: float) -> None:
+    assert 0 < speck_below(cell_size) <= SMALL_ISLAND * cell_size**3 * 1.01

@@ -14,6 +14,8 @@ import numpy as np
 from manifold3d import Error, Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import dot
+
 __all__ = ["Body", "body_of", "united"]
 
 Floats = NDArray[np.float64]
@@ -72,6 +74,14 @@ class Body:
     def bounds(self) -> Floats:
         """Lowest and highest corner of the box round it, in mm; shape (2, 3)."""
         return np.array(self.manifold.bounding_box()).reshape(2, 3)
+
+    @property
+    def centre(self) -> Floats:
+        """Centre of mass, in mm, by the tetrahedra from the origin to the triangles; shape (3,)."""
+        vertices, triangles = self.triangles()
+        a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+        weights = dot(a, np.cross(b, c))
+        return np.asarray(((a + b + c) * weights[:, np.newaxis]).sum(axis=0) / (4 * weights.sum()))
 
     def pieces(self) -> list[Body]:
         """Bodies that no edge joins, each with the voids in it, the largest first.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import zlib
-from io import BytesIO
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import BadZipFile, ZipFile
@@ -28,8 +29,6 @@ STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attri
 STL_HEADER_BYTES = 84
 # Of 3MF, in bytes: 1 GB of it holds about fifteen million triangles, and text of numbers packs ten times or so.
 _MOST_UNPACKED, _MOST_PER_BYTE, _LEAST_ALLOWED = 1_000_000_000, 100, 10_000_000
-# As meshio names them.
-_POLYGONS = ("triangle", "quad", "polygon")
 _EXPECTED = "a file of triangles, binary or text STL, 3MF, OBJ or PLY"
 
 
@@ -66,7 +65,7 @@ def read_triangles(path: str | os.PathLike[str], form: Format | None = None) -> 
     elif form is STL:
         vertices, triangles, _ = numbered_corners(_stl_corners(target))
     else:
-        vertices, triangles = _read_with_meshio(target, "obj" if form is OBJ else "ply")
+        vertices, triangles = _read_obj(target) if form is OBJ else _read_ply(target)
     if not len(triangles) or not np.isfinite(vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
     return vertices, triangles
@@ -150,27 +149,107 @@ def _distinct(flat: NDArray[Real]) -> tuple[Integers, Integers]:
     return first, numbers.ravel().astype(np.int64)
 
 
-def _read_with_meshio(path: Path, form: str) -> tuple[Floats, Integers]:
-    """Triangles of OBJ and PLY, larger polygons fanned out."""
-    # It loads a reader of every format it knows, which other files need not wait for.
-    import meshio
-
+def _read_obj(path: Path) -> tuple[Floats, Integers]:
+    """Triangles of OBJ, larger polygons fanned out; corners counted from 1, or backwards from the last one, below 0."""
+    corners: list[list[str]] = []
+    faces: list[list[int]] = []
     try:
-        if form == "ply":
-            # Of the format's names of types the library lacks one, which stands in the header alone.
-            header, end, data = path.read_bytes().partition(b"end_header")
-            mesh = meshio.ply.read(BytesIO(header.replace(b" ushort ", b" uint16 ") + end + data))
-        else:
-            mesh = meshio.read(path, form)
-    # The library's readers fail as text and numbers do, on files that are not what they seem.
-    except (meshio.ReadError, ValueError, IndexError, KeyError, TypeError, AssertionError, SystemExit) as problem:
-        raise ParameterError("file", str(path), f"{_EXPECTED}: meshio says {problem}") from None
-    polygons = [np.asarray(some.data, dtype=np.int64) for some in mesh.cells if some.type in _POLYGONS]
-    fans = [some[:, [0, k, k + 1]] for some in polygons for k in range(1, some.shape[1] - 1)]
-    numbers = np.concatenate([np.zeros((0, 3), dtype=np.int64), *fans])
-    if len(numbers) and not 0 <= numbers.min() <= numbers.max() < len(mesh.points):
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("v "):
+                corners.append(line.split()[1:4])
+            elif line.startswith("f "):
+                numbers = [int(word.partition("/")[0]) for word in line.split()[1:]]
+                numbers = [number - 1 if number > 0 else len(corners) + number for number in numbers]
+                faces += [[numbers[0], *pair] for pair in pairwise(numbers[1:])]
+        points, found = np.array(corners, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
+    except ValueError as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: {problem}") from None
+    return _with_corners(path, points, found)
+
+
+def _with_corners(path: Path, points: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+    """Corners numbered by their coordinates, as in STL: programs write one for each triangle, or for each normal."""
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(points):
         raise ParameterError("file", str(path), f"{_EXPECTED}, whose triangles name corners that are there")
-    return numbered_corners(np.asarray(mesh.points, dtype=float)[:, :3][numbers])[:2]
+    return numbered_corners(points[triangles])[:2]
+
+
+# Names of types in PLY, old and new.
+_PLY_TYPES = {
+    name: kind
+    for kind, names in {
+        "i1": "char int8",
+        "u1": "uchar uint8",
+        "i2": "short int16",
+        "u2": "ushort uint16",
+        "i4": "int int32",
+        "u4": "uint uint32",
+        "f4": "float float32",
+        "f8": "double float64",
+    }.items()
+    for name in names.split()
+}
+
+
+def _read_ply(path: Path) -> tuple[Floats, Integers]:
+    """Triangles of PLY, text or binary, of faces that all have as many corners as the first, fanned out."""
+    try:
+        table = _ply_table(path.read_bytes())
+        points = np.stack([np.asarray(table["vertex"][axis], dtype=float) for axis in "xyz"], axis=1)
+        faces = np.asarray(table["face"]["corners"], dtype=np.int64)
+        if np.any(np.asarray(table["face"]["corners count"]) != faces.shape[1]):
+            raise ValueError("its faces have different numbers of corners")
+    except (KeyError, IndexError, ValueError) as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: not understood: {problem}") from None
+    fans = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
+    return _with_corners(path, points, np.concatenate([np.zeros((0, 3), dtype=np.int64), *fans]))
+
+
+def _ply_table(contents: bytes) -> dict[str, Any]:
+    """The elements of a PLY file, each with its fields by name."""
+    head, _, data = contents.partition(b"end_header")
+    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
+    order = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}[lines[1][1]]
+    body, at = data[data.index(b"\n") + 1 :], 0
+    words = [] if order else body.split()
+    elements = [line for line in lines if line[:1] in (["element"], ["property"])]
+    starts = [index for index, line in enumerate(elements) if line[0] == "element"]
+    table: dict[str, Any] = {}
+    for first, last in pairwise([*starts, len(elements)]):
+        name, count = elements[first][1], int(elements[first][2])
+        fields, size = _ply_fields(elements[first + 1 : last], order, body[at:], words[at:])
+        if order:
+            found = np.frombuffer(body, np.dtype(fields), count, at)
+            table[name], size = found, found.itemsize
+        else:
+            rows = np.array(words[at : at + count * size], dtype=float).reshape(count, size)
+            ends = np.cumsum([0, *(field[2][0] if len(field) > 2 else 1 for field in fields)])
+            table[name] = {
+                field[0]: rows[:, low:high] if len(field) > 2 else rows[:, low]
+                for field, (low, high) in zip(fields, pairwise(ends.tolist()), strict=True)
+            }
+        at += count * size
+    return table
+
+
+def _ply_fields(
+    properties: Sequence[Sequence[str]], order: str, body: bytes, words: Sequence[bytes]
+) -> tuple[list[tuple[Any, ...]], int]:
+    """Fields of one element of PLY, lists as long as in its first record, and how many numbers they are together."""
+    fields: list[tuple[Any, ...]] = []
+    count = 0
+    for line in properties:
+        if line[1] != "list":
+            fields.append((line[2], order + _PLY_TYPES[line[1]]))
+            count += 1
+            continue
+        name = "corners" if line[4] in ("vertex_indices", "vertex_index") else line[4]
+        kind = np.dtype((order or "<") + _PLY_TYPES[line[2]])
+        before = np.dtype(fields).itemsize
+        length = int(np.frombuffer(body, kind, 1, before)[0]) if order else int(words[count])
+        fields += [(f"{name} count", kind), (name, order + _PLY_TYPES[line[3]], (length,))]
+        count += 1 + length
+    return fields, count
 
 
 def _read_3mf(path: Path) -> tuple[Floats, Integers]:

@@ -238,6 +238,11 @@ CASES: dict[str, dict[str, Case]] = {
             {"part": compound_of([block_at(20, 3), block_at(0)]), "solids": [2]},
             lambda made, usual: made.solids == 1 and near(made.volume, usual.volume, 1e-6),
         ),
+        "partial": Case(
+            {"cells": (1, 1, 1), "map": "cylinder:radius=6", "tolerance": 1e-2, "partial": True},
+            smaller,
+            ("control points",),
+        ),
         "origin": Case({"origin": (2, 0, 0)}, changed),
         "rotation": Case({"rotation": (0, 0, 30)}, changed),
         "drop islands": Case(

@@ -53,7 +53,7 @@ __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
 # Of the part and of how it is filled, whatever lattice fills it.
-_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density")
+_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density", "partial")
 
 
 def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
@@ -85,7 +85,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     nargs=3,
     type=int,
     metavar="NX NY NZ",
-    help="Fill with a block of so many cells, which --map and --scale-field may carry, and not without end.",
+    help="Fill with a block of so many cells, which --map and --scale-field may carry; it goes on as far as they do.",
 )
 @click.option(
     "--kind",
@@ -115,6 +115,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     metavar="NAME",
     help="Fill only the solids of the part that have this name, or this number; may be repeated.",
 )
+@click.option("--partial", is_flag=True, help="Fill what --cells with --map reach, even if it is not all of the part.")
 @click.option(
     "--drop-islands",
     is_flag=True,

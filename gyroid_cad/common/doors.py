@@ -145,6 +145,7 @@ FILL = (
     _row("openings", "--opening"),
     _row("core"),
     _row("solids", "--solid"),
+    _row("partial"),
     _row("origin"),
     _row("rotation"),
     _row("drop islands"),

@@ -24,7 +24,7 @@ from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.level_set import Grid, level_surface, told_apart
 from gyroid_cad.trim.islands import SealedVoid
 
-__all__ = ["Shell", "core_within", "given_core", "opened_facets", "without_specks"]
+__all__ = ["Shell", "core_within", "given_core", "opened_facets", "without_small_voids"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -200,7 +200,7 @@ def given_core(part: TrianglePart, core: Any, deviation: float) -> tuple[Body, f
     return inner.body, float(walls.min()) if len(walls) else None
 
 
-def without_specks(
+def without_small_voids(
     pieces: Sequence[Body], part: Body, middle: Floats, least: float
 ) -> tuple[list[Body], list[SealedVoid]]:
     """Pieces without voids below a volume in mm3, and the voids they seal but for the part's own, the largest first."""

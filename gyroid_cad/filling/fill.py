@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.infill import described_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
-from gyroid_cad.filling.report import FillReport, joint_report
+from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
@@ -191,6 +191,7 @@ def fill(
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
     solids: Sequence[str | int] = (),
+    partial: bool = False,
     route: Route = "brep",
     deviation: float | None = None,
 ) -> Filled:
@@ -234,13 +235,16 @@ def fill(
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
+        size, thickness, density and surface are its own. It is placed by its own origin and rotation first. Cells are
+        added round it until it covers the part, as far as its fields and its map go on.
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
     solids : sequence of str or int
         Which of the part's solids are filled: names that its file or assembly gives them, or numbers from 1. All of
         them if left out.
+    partial : bool
+        Fill what the given lattice reaches, even if that is not all of the part; the report says how much it is not.
     route : {"brep", "triangles"}
         Through exact solids; or through triangles alone, for what is printed: the part may be an STL, 3MF, OBJ or PLY
         file, and what comes out is no :class:`Filled` but :class:`~gyroid_cad.FilledTriangles`.
@@ -276,10 +280,10 @@ def fill(
     if route not in ROUTES:
         raise ParameterError("route", route, " or ".join(ROUTES))
     regions, size, settings, infill_in = described_infill(
-        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
+        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
     if route == TRIANGLES:
-        cover = partial(require_cover, cell_size=size, control_points=settings.control_points)
+        cover = functools.partial(require_cover, cell_size=size, control_points=settings.control_points)
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
         job = TriangleJob(kind, size, regions, infill_in, *given)
         # Not of the class, but with all of it that needs no B-rep.
@@ -299,7 +303,7 @@ def fill(
         with naming_triangles(kind, name if len(parts) > 1 else ""):
             hollow = _hollow(whole, shell, faces, core)
             inner = whole if hollow is None else hollow.core
-            filling = Filling(whole, hollow, regions, partial(infill_in, inner), size, told)
+            filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
         domains, voids = without_specks(domains, filling)
@@ -308,6 +312,7 @@ def fill(
     islands.warn("drop_islands drops")
     together = _together(made, remarks)
     warn_of_voids(together.report.voids)
+    warn_of_uncovered(together.report.uncovered)
     return together
 
 
@@ -387,5 +392,6 @@ def _reported(
         shift=(x, y, z),
         seconds=dict(filling.seconds),
         cells_alike=outcome.infill.grading.cells_alike,
+        uncovered=outcome.infill.uncovered,
     )
     return Filled(shapes, report)

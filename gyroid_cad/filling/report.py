@@ -9,9 +9,10 @@ from typing import Any
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, Route
 from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
-from gyroid_cad.trim.islands import SealedVoid
+from gyroid_cad.errors import PartWarning
+from gyroid_cad.trim.islands import SealedVoid, warn_caller
 
-__all__ = ["FillReport", "joint_report"]
+__all__ = ["FillReport", "joint_report", "warn_of_uncovered"]
 
 # Of several bodies these add up.
 _SUMMED = (
@@ -75,6 +76,8 @@ class FillReport:
         By stage.
     cells_alike : bool
         False where a scale field or a map makes cells of other sizes.
+    uncovered : float
+        Share of the part that the given lattice does not reach.
     bodies : int
         Solids of the part, each of which was filled by itself.
     remarks : tuple of str
@@ -126,6 +129,7 @@ class FillReport:
     shift: Point
     seconds: dict[str, float]
     cells_alike: bool
+    uncovered: float = 0.0
     bodies: int = 1
     remarks: tuple[str, ...] = ()
     route: Route = "brep"
@@ -144,6 +148,7 @@ class FillReport:
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
             *([] if self.skin is None else [("skin", f"{self.skin:g} mm{self._rounded()}")]),
             *([] if self.bodies == 1 else [("bodies", f"{self.bodies}, each filled by itself")]),
+            *([("uncovered", f"{100 * self.uncovered:.3g} % of the part")] if self.uncovered else []),
             *(("part", remark) for remark in self.remarks),
             self._counted(),
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
@@ -172,6 +177,12 @@ class FillReport:
         return text_table(self.rows())
 
 
+def warn_of_uncovered(share: float) -> None:
+    """Emit a :class:`~gyroid_cad.PartWarning` if some of a part is out of the lattice's reach."""
+    if share:
+        warn_caller(f"{100 * share:.3g} % of the part is out of the lattice's reach", PartWarning)
+
+
 def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:
     """Report on several bodies together, each of which was filled by itself.
 
@@ -195,6 +206,7 @@ def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> 
         thickness=max(report.thickness for report in reports),
         min_wall=min((report.min_wall for report in reports if report.min_wall is not None), default=None),
         density=sums["volume"] / sums["part_volume"],
+        uncovered=sum(report.uncovered * report.part_volume for report in reports) / sums["part_volume"],
         by_sections=all(report.by_sections for report in reports),
         shift=next((report.shift for report in reports if any(report.shift)), first.shift),
         seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},

@@ -18,7 +18,7 @@ from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.part import shapes_of, solid_names
 from gyroid_cad.filling.wanted import SURFACE
 from gyroid_cad.kernel.check import compound_of
-from gyroid_cad.kernel.part import face_numbers
+from gyroid_cad.kernel.part import face_numbers, points_within, spread_points
 from gyroid_cad.kernel.repair import chosen_solids
 from gyroid_cad.kernel.stl import solid_triangles
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
@@ -78,6 +78,16 @@ class TrianglePart:
     def near(self, points: Floats, reach: Floats | float) -> Booleans:
         """Mask of the points that lie inside or within a reach of it, in mm."""
         return np.asarray(self.distances(points) <= reach)
+
+    def points_inside(self, count: int) -> Floats:
+        """Points spread at random over the inside, the same ones each time; shape (n, 3), as many as are wanted."""
+        return points_within(self.low, self.high, self.contains, count)
+
+    def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
+        """Points on the boundary, their normals, and how far at most any place on it is from one, in mm."""
+        vertices, triangles = self.body.triangles()
+        a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+        return *spread_points(a, b, c, spacing), spacing
 
     def bodies(self) -> list[TrianglePart]:
         """Parts of it that hang together, each by itself."""

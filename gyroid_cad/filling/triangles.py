@@ -16,9 +16,9 @@ from gyroid_cad.common.choices import Kind, Route
 from gyroid_cad.common.formats import STL, THREE_MF, TRIANGLE_FORMATS, format_of, require_formats, require_meshing
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import KernelError, ParameterError, PartWarning
-from gyroid_cad.filling.distance_skin import Shell, opened_facets, without_specks
+from gyroid_cad.filling.distance_skin import Shell, opened_facets, without_small_voids
 from gyroid_cad.filling.infill import Infill, InfillIn
-from gyroid_cad.filling.report import FillReport, joint_report
+from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import TrianglePart, triangle_part
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
@@ -282,6 +282,7 @@ class TriangleJob:
         islands.warn("drop_islands drops")
         report = joint_report(reports, whole.remarks)
         warn_of_voids(report.voids)
+        warn_of_uncovered(report.uncovered)
         counts = np.cumsum([0, *(len(vertices) for vertices, _ in places)])
         triangles = np.concatenate([numbers + first for (_, numbers), first in zip(places, counts[:-1], strict=True)])
         return FilledTriangles(np.concatenate([vertices for vertices, _ in places]), triangles, report)
@@ -315,7 +316,7 @@ class TriangleJob:
             left = [piece for some in kept.values() for piece in some]
             voids: list[SealedVoid] = []
             if not any(region.fluid for region in self.regions):
-                left, voids = without_specks(left, part.body, filling.middle, speck_below(self.cell_size))
+                left, voids = without_small_voids(left, part.body, filling.middle, speck_below(self.cell_size))
             places = _arrays(left, filling.middle, deviation)
         return places, self._report(filling, left, islands, voids, skin, len(places[1])), islands
 
@@ -358,6 +359,7 @@ class TriangleJob:
             shift=(0.0, 0.0, 0.0),
             seconds=filling.seconds,
             cells_alike=infill.grading.cells_alike,
+            uncovered=infill.uncovered,
             route=TRIANGLES,
             deviation=filling.deviation,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -44,9 +44,11 @@ __all__ = [
     "Part",
     "face_numbers",
     "measure",
+    "points_within",
     "require_part",
     "selected_faces",
     "selected_way",
+    "spread_points",
 ]
 
 Floats = NDArray[np.float64]
@@ -59,6 +61,8 @@ _ANGULAR_DEFLECTION = 0.5
 # beyond its deflection here and there: within so many times it the kernel is asked.
 _INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
+# Of a part that takes up little of its box fewer points are found than are asked for.
+_MOST_BATCHES = 8
 _BOX_FACES, _BOX_CORNERS = 6, 8
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
@@ -127,6 +131,10 @@ class Part:
         BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, True)
         return _triangles(copy)
 
+    def points_inside(self, count: int) -> Floats:
+        """Points spread at random over the inside, the same ones each time; shape (n, 3), as many as are wanted."""
+        return points_within(self.low, self.high, self.contains, count)
+
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
 
@@ -143,9 +151,20 @@ class Part:
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
-        clouds = [_spread(*triangles, spacing) for triangles in self._meshed(deflection)]
+        clouds = [spread_points(*triangles, spacing) for triangles in self._meshed(deflection)]
         points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
         return points, normals, spacing + deflection
+
+
+def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:
+    """Points spread at random over what a box holds of something, as :meth:`Part.points_inside` gives them."""
+    random, found = np.random.default_rng(0), np.empty((0, 3))
+    for _ in range(_MOST_BATCHES):
+        points = random.uniform(low, high, (count, 3))
+        found = np.concatenate([found, points[contains(points)]])
+        if len(found) >= count:
+            break
+    return found[:count]
 
 
 def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
@@ -225,7 +244,7 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
         yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
 
 
-def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
+def spread_points(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
     """Points of triangles, their corners among them, so that no place is further than the spacing from one; normals."""
     normals = unit(np.cross(b - a, c - a))
     steps = [np.ceil(np.linalg.norm(end - a, axis=1) / spacing).astype(int).clip(1) for end in (b, c)]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
-from gyroid_cad.filling.extent import MappedExtent, block_round, extent_of, preimages, uncovered
+from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
 from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -135,7 +134,10 @@ class Infill:
         ]
 
 
-InfillIn = Callable[[Part, Frame, Timed], Infill]
+class InfillIn(Protocol):
+    """Gives the lattice for a part and a frame, each stage timed, with a uniform wall of so many mm at least."""
+
+    def __call__(self, part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill: ...
 
 
 def described_infill(
@@ -162,7 +164,7 @@ def described_infill(
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
         regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
 
-        def block(part: Part, frame: Frame, timed: Timed) -> Infill:
+        def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
             return block_infill(lattice, part, frame, timed, partial)
 
         return regions.regions, lattice.cell_size, fit, block
@@ -172,8 +174,8 @@ def described_infill(
     settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
     closeness = tolerance or USUAL_TOLERANCE
 
-    def endless(part: Part, frame: Frame, timed: Timed) -> Infill:
-        made = endless_infill(part, frame, size, wanted, settings, closeness, timed, surface)
+    def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
+        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
         smallest = float(np.min(part.high - part.low))
         if smallest <= made.max_thickness:
             name, given = ("thickness", thickness) if density is None else ("density", density)
@@ -188,7 +190,7 @@ def described_infill(
 
 
 def endless_infill(
-    part: Part,
+    part: Part | BoundedExtent,
     frame: Frame,
     cell_size: float,
     regions: Regions,
@@ -201,7 +203,7 @@ def endless_infill(
 
     Parameters
     ----------
-    part : Part
+    part : Part or BoundedExtent
     frame : Frame
     cell_size : float
         In mm.
@@ -224,7 +226,7 @@ def endless_infill(
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
-            if not grading.uniform:
+            if not (grading.uniform and isinstance(part, Part)):
                 grading = replace(grading, extent=PlacedExtent(extent_of(part, cell_size), frame))
             min_thickness, max_thickness = wall_extremes(low, high, frame, grading)
             complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface, grading.extent)
@@ -262,7 +264,9 @@ def require_cover(low: Floats, high: Floats, cell_size: float, control_points: i
     require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
 
 
-def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, partial: bool = False) -> Infill:
+def block_infill(
+    lattice: Lattice, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool = False
+) -> Infill:
     """A lattice that was described as a block of cells, with whatever varies in it, as far as a part needs it.
 
     Where its cells are alike it goes on for ever. Else cells are added round the block as far as its map goes on.
@@ -270,7 +274,7 @@ def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, parti
     Parameters
     ----------
     lattice : Lattice
-    part : Part
+    part : Part or BoundedExtent
     frame : Frame
         That the lattice is placed by, wherever it stands in its own space.
     timed : callable
@@ -296,7 +300,7 @@ def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, parti
     )
 
 
-def _mapped_infill(spec: LatticeSpec, part: Part, frame: Frame, timed: Timed, partial: bool) -> Infill:
+def _mapped_infill(spec: LatticeSpec, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool) -> Infill:
     """A block that a scale or a map carries, with cells added round it, until the part is covered or they end."""
     with timed("cover"):
         extent = PlacedExtent(extent_of(part, spec.grading.cell_size), frame)

@@ -22,8 +22,9 @@ from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import triangles_of
 from gyroid_cad.kernel.split import inner_point
+from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
-from gyroid_cad.mesh.triangles.measures import SignedDistances, unmatched_edges
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
 
 __all__ = ["Depths", "FaceDistances", "NearDistances", "points_on"]
 

@@ -56,7 +56,8 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cadquery.exporters.export(cadquery.Workplane().box(5, 6, 7), str(folder / "part.step"))
     lattice = Lattice((1, 1, 1), 10.0, 0.8, fit=FitSettings(5))
     lattice.write(folder / "part.stl", folder / "part.3mf", deviation=0.2)
-    cadquery.exporters.export(cadquery.Workplane().box(4, 4, 4), str(folder / "other.step"))
+    for name in ("other.step", "scan.stl"):
+        cadquery.exporters.export(cadquery.Workplane().box(4, 4, 4), str(folder / name))
     (folder / "fill.toml").write_text(
         'part = "part.step"\noutput = "light.step"\ncell_size = 10\ndensity = 0.3\ncontrol_points = 5\n'
     )

@@ -49,6 +49,7 @@ __all__ = [
     "selected_faces",
     "selected_way",
     "spread_points",
+    "triangles_of",
 ]
 
 Floats = NDArray[np.float64]
@@ -154,6 +155,14 @@ class Part:
         clouds = [spread_points(*triangles, spacing) for triangles in self._meshed(deflection)]
         points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
         return points, normals, spacing + deflection
+
+
+def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
+    """Corners of triangles no further from a shape's faces than a deflection in mm; shape (triangles, 3, 3)."""
+    copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
+    # In one thread, so that a process may be forked from this one.
+    BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
+    return np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(copy))])
 
 
 def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:

@@ -250,6 +250,10 @@ CASES: dict[str, dict[str, Case]] = {
             # Two pieces of this plate are left otherwise, the smaller one of 1.08 mm3.
             lambda made, usual: made.solids == 1 and near(made.volume, 5.344, 1e-3),
         ),
+        "route": Case(
+            {"file": "made.stl", "route": "triangles", "deviation": 0.2},
+            lambda made, usual: sized(made, usual) and (told(made, "no B-rep was made") or made.report["faces"] < 4000),
+        ),
         "material density": Case({"material density": 2.7}, weighed),
         "lattice": Case(
             {"lattice": Lattice((2, 2, 2), CELL, density=0.2, origin=(-8, -8, -8), fit=FitSettings(4))},
@@ -291,13 +295,17 @@ def python(table: str, given: Given, folder: Path, captured: Captured) -> Made:
     else:
         maker = Lattice.paper if "thickness_factor" in names else Lattice
     own = taken(fill if table == "fill" else maker)
+    if names.get("route") != "triangles":
+        # Of triangles that a solid is written as.
+        own -= {"deviation"}
     made = maker(**{name: value for name, value in names.items() if name in own})
     rest = {name: value for name, value in names.items() if name not in own}
     report = made.report.as_dict() if table == "fill" else {}
     if path is None:
         return Made(made.solid(**rest), stages=stages, report=report)
     made.write(folder / path, **rest)
-    return Made(made.solid(), folder / path, stages=stages, report=report)
+    shape = made.solid() if hasattr(made, "solid") else None
+    return Made(shape, folder / path, stages=stages, report=report)
 
 
 def shell(table: str, given: Given, folder: Path, captured: Captured) -> Made:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from gyroid_cad.wall.complex import CellComplex, build_complex
 from gyroid_cad.wall.covering import BoxExtent, Frame, PlacedExtent, periodic_patches
 from gyroid_cad.wall.grading import Extent, Grading
 
-__all__ = ["MappedExtent", "PartExtent", "block_round", "extent_of", "preimages", "uncovered"]
+__all__ = ["BoundedExtent", "MappedExtent", "PartExtent", "block_round", "extent_of", "preimages", "uncovered"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -57,8 +58,26 @@ class PartExtent:
         return found
 
 
-def extent_of(part: Part, cell_size: float) -> Extent:
-    """The space that a part takes up: a box is known at once, anything else by points on its boundary."""
+class BoundedExtent(Extent, Protocol):
+    """Space to be filled that answers for itself, with the corners of the box round it in mm."""
+
+    @property
+    def low(self) -> Floats: ...
+
+    @property
+    def high(self) -> Floats: ...
+
+    def points_inside(self, count: int) -> Floats:
+        """Points spread at random over the inside, the same ones each time; shape (n, 3)."""
+
+    def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
+        """Points on the boundary, as :meth:`gyroid_cad.kernel.part.Part.surface_samples` gives them."""
+
+
+def extent_of(part: Part | BoundedExtent, cell_size: float) -> Extent:
+    """The space that a part takes up: a box is known at once, any other solid by points on its boundary."""
+    if not isinstance(part, Part):
+        return part
     if part.box is not None:
         low, high = (tuple(corner.tolist()) for corner in (part.box.low, part.box.high))
         return PlacedExtent(BoxExtent(low, high), Frame(np.zeros(3), part.box.axes.T))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial as partial_of
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from gyroid_cad.common.choices import Kind
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
-from gyroid_cad.filling.extent import MappedExtent, block_round, extent_of, preimages, uncovered
+from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
+from gyroid_cad.filling.forecast import Forecast, forecast_of
 from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -133,8 +133,16 @@ class Infill:
         ]
 
 
-Check = Callable[[Part], None]
-InfillIn = Callable[[Part, Frame, Timed], Infill]
+class Foreseen(Protocol):
+    """Tells what filling a part takes, and refuses one that memory would not hold, or that is thinner than the wall."""
+
+    def __call__(self, part: Part) -> Forecast: ...
+
+
+class InfillIn(Protocol):
+    """Gives the lattice for a part and a frame, each stage timed, with a uniform wall of so many mm at least."""
+
+    def __call__(self, part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill: ...
 
 
 def described_infill(
@@ -147,8 +155,8 @@ def described_infill(
     lattice: Lattice | None,
     surface: MinimalSurface,
     partial: bool = False,
-) -> tuple[tuple[Region, ...], float, FitSettings, Check, InfillIn]:
-    """The regions wanted, the cell size, the fit, a check of a part, and how the lattice is to be had for one.
+) -> tuple[tuple[Region, ...], float, FitSettings, Foreseen, InfillIn]:
+    """The regions wanted, the cell size, the fit, what a part would take, and how the lattice is to be had for one.
 
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
@@ -161,34 +169,54 @@ def described_infill(
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
         regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
 
-        def block(part: Part, frame: Frame, timed: Timed) -> Infill:
+        def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
             return block_infill(lattice, part, frame, timed, partial)
 
         uniform = lattice.wall_thickness if lattice.uniform else 0.0
-        check = partial_of(require_thicker, wall=uniform, thickness=lattice.thickness, density=lattice.density)
-        return regions.regions, lattice.cell_size, fit, check, block
+        own = lattice.cell_size, uniform, lattice.thickness, lattice.density
+        foreseen = partial_of(_foreseen, lattice.grading().cells_alike, lattice.fit.control_points, *own)
+        return regions.regions, lattice.cell_size, fit, foreseen, block
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
     settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
     closeness = tolerance or USUAL_TOLERANCE
 
-    def endless(part: Part, frame: Frame, timed: Timed) -> Infill:
-        made = endless_infill(part, frame, size, wanted, settings, closeness, timed, surface)
+    def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
+        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
         require_thicker(part, made.max_thickness, thickness, density)
         return made
 
     uniform = wanted.thickness if isinstance(wanted.thickness, float) else 0.0
-    check = partial_of(require_thicker, wall=uniform, thickness=thickness, density=density)
-    return wanted.regions, size, settings, check, endless
+    foreseen = partial_of(_foreseen, True, settings.control_points, size, uniform, thickness, density)
+    return wanted.regions, size, settings, foreseen, endless
 
 
-def require_thicker(part: Part, wall: float, thickness: FieldLike | None, density: FieldLike | None) -> None:
+def _foreseen(
+    without_end: bool,
+    control_points: int,
+    cell_size: float,
+    wall: float,
+    thickness: FieldLike | None,
+    density: FieldLike | None,
+    part: Part,
+) -> Forecast:
+    forecast = forecast_of(part, cell_size, control_points)
+    if without_end:
+        forecast.require_memory(cell_size)
+    require_thicker(part, wall, thickness, density)
+    return forecast
+
+
+def require_thicker(
+    part: Part | BoundedExtent, wall: float, thickness: FieldLike | None, density: FieldLike | None
+) -> None:
     """Check that a part is somewhere thicker than the wall that is to fill it.
 
     Parameters
     ----------
-    part : Part
+    part : Part or BoundedExtent
+        Of the latter the box is looked at.
     wall : float
         Whole wall where it is thickest, in mm; 0 where that is not known yet.
     thickness, density : number or field, optional
@@ -198,14 +226,17 @@ def require_thicker(part: Part, wall: float, thickness: FieldLike | None, densit
     ------
     ParameterError
     """
-    if wall and (thickest := part.thickest(wall)) <= wall:
+    if not wall:
+        return
+    thickest = part.thickest(wall) if isinstance(part, Part) else float(np.min(part.high - part.low))
+    if thickest <= wall:
         name, given = ("thickness", thickness) if density is None else ("density", density)
         accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
         raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def endless_infill(
-    part: Part,
+    part: Part | BoundedExtent,
     frame: Frame,
     cell_size: float,
     regions: Regions,
@@ -218,7 +249,7 @@ def endless_infill(
 
     Parameters
     ----------
-    part : Part
+    part : Part or BoundedExtent
     frame : Frame
     cell_size : float
         In mm.
@@ -241,7 +272,7 @@ def endless_infill(
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
-            if not grading.uniform:
+            if not (grading.uniform and isinstance(part, Part)):
                 grading = replace(grading, extent=PlacedExtent(extent_of(part, cell_size), frame))
             min_thickness, max_thickness = wall_extremes(low, high, frame, grading)
             complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface, grading.extent)
@@ -253,7 +284,9 @@ def endless_infill(
     return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
 
 
-def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, partial: bool = False) -> Infill:
+def block_infill(
+    lattice: Lattice, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool = False
+) -> Infill:
     """A lattice that was described as a block of cells, with whatever varies in it, as far as a part needs it.
 
     Where its cells are alike it goes on for ever. Else cells are added round the block as far as its map goes on.
@@ -261,7 +294,7 @@ def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, parti
     Parameters
     ----------
     lattice : Lattice
-    part : Part
+    part : Part or BoundedExtent
     frame : Frame
         That the lattice is placed by, wherever it stands in its own space.
     timed : callable
@@ -287,7 +320,7 @@ def block_infill(lattice: Lattice, part: Part, frame: Frame, timed: Timed, parti
     )
 
 
-def _mapped_infill(spec: LatticeSpec, part: Part, frame: Frame, timed: Timed, partial: bool) -> Infill:
+def _mapped_infill(spec: LatticeSpec, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool) -> Infill:
     """A block that a scale or a map carries, with cells added round it, until the part is covered or they end."""
     with timed("cover"):
         extent = PlacedExtent(extent_of(part, spec.grading.cell_size), frame)

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
-from gyroid_cad.errors import KernelError
+from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
@@ -32,7 +33,17 @@ from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
 from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "bodies_of", "part_of", "without_islands", "without_specks"]
+__all__ = [
+    "Filling",
+    "Made",
+    "Outcome",
+    "bodies_of",
+    "part_of",
+    "shapes_of",
+    "solid_names",
+    "without_islands",
+    "without_specks",
+]
 
 Floats = NDArray[np.float64]
 
@@ -340,10 +351,22 @@ def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[
     ExportError
         If a file is neither STEP nor BREP, or holds no shape.
     """
-    chosen = [solids] if isinstance(solids, str | int) else list(solids)
-    named = read_named(given) if isinstance(given, str | os.PathLike) else named_shapes(given)
-    separate, remarks = separate_solids(*named, chosen)
+    separate, remarks = separate_solids(*shapes_of(given), solid_names(solids))
     return [(name, require_part(solid)) for name, solid in separate], remarks
+
+
+def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]]]:
+    """The kernel's shapes of whatever a user gives as a part, unchecked, and the names of each."""
+    if not isinstance(given, str | os.PathLike):
+        return named_shapes(given)
+    if format_of(given) in TRIANGLE_FORMATS:
+        raise ParameterError("part", str(given), 'a STEP or BREP file; triangles are filled by route="triangles"')
+    return read_named(given)
+
+
+def solid_names(solids: Sequence[str | int]) -> list[str | int]:
+    """Names or numbers of the solids that are wanted, be it one alone."""
+    return [solids] if isinstance(solids, str | int) else list(solids)
 
 
 def part_of(given: Any) -> Part:

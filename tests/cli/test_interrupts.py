@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from gyroid_cad import __main__ as program
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.three_mf import write_3mf
+from gyroid_cad.mesh.triangles.writing import write_3mf
 from gyroid_cad.surface.fit import FitSettings
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are sent to processes")

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from gyroid_cad.fields.field import Field
     from gyroid_cad.filling.fill import Filled, fill
     from gyroid_cad.filling.report import FillReport
+    from gyroid_cad.filling.triangles import FilledTriangles
     from gyroid_cad.lattice import Lattice, LatticeReport
     from gyroid_cad.mesh.finite_elements.hexahedra import Mesh
     from gyroid_cad.mesh.iga.patches import VolumePatches
@@ -45,6 +46,7 @@ __all__ = [
     "Field",
     "FillReport",
     "Filled",
+    "FilledTriangles",
     "FitError",
     "FitSettings",
     "GyroidError",
@@ -80,6 +82,7 @@ _HOMES = {
     "fields.field": ("Field",),
     "filling.fill": ("Filled", "fill"),
     "filling.report": ("FillReport",),
+    "filling.triangles": ("FilledTriangles",),
     "lattice": ("Lattice", "LatticeReport"),
     "mesh.finite_elements.hexahedra": ("Mesh",),
     "mesh.iga.patches": ("VolumePatches",),

@@ -104,7 +104,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
         In a builder, the filled part takes the place of what is there.
-    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface, solids
+    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface, solids, partial
         As of :func:`gyroid_cad.fill`.
 
     Attributes
@@ -150,6 +150,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         lattice: Lattice | None = None,
         surface: SurfaceName = "gyroid",
         solids: Sequence[str | int] = (),
+        partial: bool = False,
     ) -> None:
         # As the host's operations do, not as its objects: those are placed at the builder's locations.
         context: BuildPart | None = BuildPart._get_context("GyroidFill")
@@ -175,6 +176,7 @@ class GyroidFill(Part):  # type: ignore[misc]
             surface=surface,
             keep_islands=keep_islands,
             solids=solids,
+            partial=partial,
         )
         self.report = filled.report
         self.mode = mode

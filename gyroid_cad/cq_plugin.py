@@ -119,6 +119,7 @@ def gyroid_fill(
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
     solids: Sequence[str | int] = (),
+    partial: bool = False,
 ) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
@@ -128,7 +129,7 @@ def gyroid_fill(
     Parameters
     ----------
     cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
-    tolerance, lattice, surface, solids
+    tolerance, lattice, surface, solids, partial
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -172,6 +173,7 @@ def gyroid_fill(
         surface=surface,
         keep_islands=keep_islands,
         solids=solids,
+        partial=partial,
     )
     for name, domain in made.domains.items():
         self.newObject([cq.Shape.cast(domain)]).tag(name)

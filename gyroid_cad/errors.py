@@ -246,7 +246,7 @@ class IslandsWarning(UserWarning):
 
 
 class PartWarning(UserWarning):
-    """A part is not filled as it was given: its solids were repaired, or united where they overlap.
+    """A part is not filled as it was given: its solids were repaired or united, or some of it is out of reach.
 
     Examples
     --------

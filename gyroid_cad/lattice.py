@@ -200,11 +200,11 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         progress: Progress | None = None,
         instances: bool = False,
     ) -> None:
-        """Write files; each path's ending chooses STEP (.step, .stp), BREP (.brep), STL (.stl) or 3MF (.3mf).
+        """Write files; each path's ending chooses STEP (.step, .stp), BREP, STL, 3MF, OBJ or PLY.
 
         Every path and setting is checked before anything is built. A file appears whole or not at all. STL and 3MF
         of whole patches are made straight from the NURBS faces: unless STEP or BREP is asked for as well, no solid is
-        built and no kernel loaded. STL is streamed; 3MF is in memory as a whole while it is written.
+        built and no kernel loaded. STL is streamed; the others are in memory as a whole while they are written.
 
         Parameters
         ----------

@@ -45,7 +45,7 @@ OWNERS = {
     "cadquery": ("cq_plugin", "cli.window", "host_shapes"),
     "build123d": ("bd_objects", "host_shapes"),
     # CadQuery's viewer is made of it, and distances to triangles are asked of it.
-    "vtkmodules": ("cli.window", "mesh.triangles.measures"),
+    "vtkmodules": ("cli.window", "mesh.triangles.distances"),
 }
 MOST_LINES = 400
 MOST_IMPORTS_IN_FUNCTIONS = 60

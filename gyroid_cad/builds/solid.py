@@ -23,7 +23,7 @@ from gyroid_cad.kernel.solid import KernelShape, another_handle, build_solid
 from gyroid_cad.kernel.step import write_step
 from gyroid_cad.kernel.stl import closed_triangles, write_meshed_stl
 from gyroid_cad.kernel.trimmed import build_trimmed
-from gyroid_cad.mesh.triangles.three_mf import write_3mf
+from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
 from gyroid_cad.wall.areas import fitted_areas
@@ -198,7 +198,7 @@ def write_shape(
     elif form is STL:
         write_meshed_stl(shape, path, deviation, angle)
     else:
-        write_3mf(*closed_triangles(shape, path, deviation, angle), path)
+        write_triangles(*closed_triangles(shape, path, deviation, angle), path)
 
 
 _builds: Cache[LatticeSpec, Build] = Cache()

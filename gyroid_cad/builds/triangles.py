@@ -8,21 +8,21 @@ from math import ceil, prod
 from typing import Any
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, format_of, require_formats
+from gyroid_cad.common.formats import STL, TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import require_near_origin, write_stl
-from gyroid_cad.mesh.triangles.three_mf import write_3mf
 from gyroid_cad.mesh.triangles.triangulation import triangulated
+from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.wall.areas import fitted_areas
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
 __all__ = ["TriangleReport", "Triangles", "triangle_report", "triangles"]
 
-# Peak memory of writing 3MF, as measured, rounded up.
-_3MF_BYTES_PER_TRIANGLE = 400
+# Peak memory of writing 3MF, which takes the most, as measured, rounded up.
+_BYTES_PER_TRIANGLE = 400
 
 
 class Triangles:
@@ -44,7 +44,7 @@ class Triangles:
             self.triangulation = triangulated(fitted.wall, deviation)
 
     def write(self, *paths: str | os.PathLike[str], progress: Progress | None = None) -> None:
-        """Write files; each path's ending chooses STL (.stl) or 3MF (.3mf). A file appears whole or not at all.
+        """Write files; each path's ending chooses STL, 3MF, OBJ or PLY. A file appears whole or not at all.
 
         Parameters
         ----------
@@ -56,25 +56,25 @@ class Triangles:
         Raises
         ------
         ParameterError
-            If a file cannot count so many triangles, memory would not do for 3MF, or the lattice is too far off for
-            single precision.
+            If a file cannot count so many triangles, memory would not do for other formats than STL, or the lattice is
+            too far off for single precision.
         ExportError
         """
         targets = require_formats(paths, TRIANGLE_FORMATS)
         for path in targets:
             require_near_origin(path, self.fitted.bounding_box(), self.triangulation.deviation)
-        if any(format_of(path) is THREE_MF for path in targets):
+        if any(format_of(path) is not STL for path in targets):
             cells = self.fitted.spec.cells
             count = self.triangulation.triangle_count
-            require_memory(cells, ceil(_3MF_BYTES_PER_TRIANGLE * count / prod(cells)), kernel=False)
+            require_memory(cells, ceil(_BYTES_PER_TRIANGLE * count / prod(cells)), kernel=False)
         for path in targets:
             stage = f"write {path.name}"
-            if format_of(path) is THREE_MF:
-                with timed(self.seconds, stage, progress):
-                    write_3mf(*indexed_triangles(self.triangulation), path)
-            else:
+            if format_of(path) is STL:
                 with timed(self.seconds, stage, None):
                     write_stl(self.triangulation, path, progress, stage)
+            else:
+                with timed(self.seconds, stage, progress):
+                    write_triangles(*indexed_triangles(self.triangulation), path)
 
 
 @dataclass(frozen=True, slots=True)

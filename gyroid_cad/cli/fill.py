@@ -1,9 +1,8 @@
-"""``gyroid-cad fill``: a part from a STEP or BREP file goes in, the same part filled with gyroid comes out."""
+"""``gyroid-cad fill``: a part from a file goes in, the same part filled with gyroid comes out."""
 
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -35,16 +34,25 @@ from gyroid_cad.cli.options import (
     schema_option,
 )
 from gyroid_cad.cli.print_check import check_by
-from gyroid_cad.common.choices import KINDS
+from gyroid_cad.common.choices import KINDS, ROUTES, Route
 from gyroid_cad.common.files import file_sizes
-from gyroid_cad.common.formats import PART_FORMATS, TOML, format_of, listed_endings, require_formats, require_settings
+from gyroid_cad.common.formats import (
+    PART_FORMATS,
+    TOML,
+    TRIANGLE_FORMATS,
+    format_of,
+    listed_endings,
+    require_formats,
+    require_settings,
+)
 from gyroid_cad.common.memory import require_libraries
-from gyroid_cad.errors import ParameterError
+from gyroid_cad.errors import KernelError, ParameterError
 
 __all__ = ["fill_command"]
 
+BREP, TRIANGLES = ROUTES
 # Of the part and of how it is filled, whatever lattice fills it.
-_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density")
+_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density", "partial")
 
 
 def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
@@ -64,7 +72,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @click.argument(
     "part",
     nargs=-1,
-    metavar="[PART.step|PART.brep] [FILL.toml]",
+    metavar="[PART.step|PART.brep|PART.stl] [FILL.toml]",
     is_eager=True,
     callback=_take_files,
     shell_complete=file_paths,
@@ -76,7 +84,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     nargs=3,
     type=int,
     metavar="NX NY NZ",
-    help="Fill with a block of so many cells, which --map and --scale-field may carry, and not without end.",
+    help="Fill with a block of so many cells, which --map and --scale-field may carry; it goes on as far as they do.",
 )
 @click.option(
     "--kind",
@@ -106,6 +114,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     metavar="NAME",
     help="Fill only the solids of the part that have this name, or this number; may be repeated.",
 )
+@click.option("--partial", is_flag=True, help="Fill what --cells with --map reach, even if it is not all of the part.")
 @click.option(
     "--drop-islands",
     is_flag=True,
@@ -113,6 +122,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "are dropped anyway.",
 )
 @click.option("--keep-islands", is_flag=True, help="Keep small ones too.")
+@click.option(
+    "--route",
+    type=click.Choice(ROUTES),
+    help="Through exact solids, or through triangles alone, which serves every part and is faster; if left out, "
+    "triangles where all files that are written hold triangles.",
+)
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
 @deviation_option
@@ -130,7 +145,7 @@ def fill_command(
     quiet: bool,
     **given: Any,
 ) -> None:
-    """Fill the solids of a STEP or BREP file with gyroid and write what is left.
+    """Fill the solids of a STEP or BREP file, or what an STL, 3MF, OBJ or PLY file bounds, with gyroid.
 
     A TOML file has these options as keys, with underscores, and the part as "part"; options given as well override it.
 
@@ -140,6 +155,7 @@ def fill_command(
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --core inner.step
     gyroid-cad fill machine.step -o light.step --cell-size 7 --density 0.30 --solid bracket
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
+    gyroid-cad fill scan.stl -o light.3mf --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
     gyroid-cad fill fill.toml
     gyroid-cad fill other.step fill.toml -o other_light.step --density 0.25
@@ -161,8 +177,15 @@ def fill_command(
     written = {name: given[name] for name in ("schema", "deviation", "angle")}
     require_settings((1, 1, 1), **written)
     checked = None if printer is None else check_by(printer)
-    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        filled = fill(part, progress=progress, **settings)
+    settings["route"] = _route(part, given["route"], output)
+    if settings["route"] == TRIANGLES:
+        require_formats(output, TRIANGLE_FORMATS)
+        settings["deviation"], written = given["deviation"], {}
+    with shown_progress(not quiet, lines=True) as progress:
+        try:
+            filled = fill(part, progress=progress, **settings)
+        except KernelError as failed:
+            raise KernelError(str(failed).replace('route="triangles"', "--route triangles")) from failed
         filled.write(*output, **written, progress=progress)
         check = None if checked is None else checked(filled, given["deviation"], progress)
     summary = filled.report.as_dict()
@@ -176,6 +199,21 @@ def fill_command(
         print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
         if check is not None:
             print_check_table(check)
+
+
+def _route(part: str, chosen: Route | None, output: Sequence[str]) -> Route:
+    """Return the route to take: the one that was chosen, or triangles where nothing but triangles is written.
+
+    Raises
+    ------
+    ParameterError
+    """
+    formats = {format_of(path) for path in output}
+    route = chosen or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
+    if route == BREP and format_of(part) in TRIANGLE_FORMATS:
+        accepted = f"a STEP or BREP file; triangles fill by --route triangles, into {listed_endings(TRIANGLE_FORMATS)}"
+        raise ParameterError("part", part, accepted)
+    return route
 
 
 def _require_another_file(read: str, output: Sequence[str]) -> None:

@@ -29,11 +29,12 @@ REQUIRED = (
     "tomli-w",
     "meshio",
     "lib3mf",
+    "manifold3d",
 )
 OPTIONAL = {
     "cadquery": "adds Workplane.gyroid, and the window of view; needs OCP 7.9",
     "build123d": "has Gyroid and GyroidFill; 0.12 needs OCP 7.9, 0.13 OCP 8",
-    "vtk": "measures the walls of STL and 3MF files in print-check",
+    "vtk": "tells inside from outside of parts, and measures walls in print-check",
     "matplotlib": "draws histograms: mesh --histogram",
     "mapdl-archive": "writes ANSYS .cdb files",
 }

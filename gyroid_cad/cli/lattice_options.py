@@ -138,7 +138,8 @@ _INFILL_OPTIONS = (
     click.option(
         "--map",
         metavar="MAP",
-        help="Of space: cylinder:radius=MM, sphere:radius=MM (both also angle=DEGREES), twist:angle=, bend:angle=.",
+        help="Of space: cylinder:radius=MM, sphere:radius=MM (both also angle=DEGREES), bend:angle=, twist:angle= "
+        "(also x=MM and y=MM, where its axis stands).",
     ),
     click.option(
         "--thickness-factor", metavar="T", help="The paper's: whole wall in BC units, instead of --thickness."

@@ -77,7 +77,8 @@ deviation_option = click.option(
     "--deviation",
     type=float,
     metavar="MM",
-    help="Of the triangles in .stl and .3mf; a thousandth of the cell size if left out, or a tenth of a thin wall.",
+    help="Of the triangles in .stl, .3mf, .obj and .ply; a thousandth of the cell size if left out, or a tenth of a "
+    "thin wall.",
 )
 angle_option = click.option(
     "--angle",
@@ -85,7 +86,7 @@ angle_option = click.option(
     default=15.0,
     show_default=True,
     metavar="DEGREES",
-    help="Between triangles of a lattice or part that is cut; those of whole patches keep to the deviation alone.",
+    help="Between triangles of a solid that is cut; those of whole patches keep to the deviation alone.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 quiet_option = click.option("--quiet", is_flag=True, help="Print no table and no progress.")

@@ -51,7 +51,7 @@ _COMMON = {"config", "output", "as_json", "quiet", "help"}
 def report_command(
     output: tuple[str, ...], subdivisions: int, printer: str, as_json: bool, quiet: bool, **given: Any
 ) -> None:
-    """Report on a lattice, or on a STEP, BREP, STL or 3MF file.
+    """Report on a lattice, or on a STEP, BREP, STL, 3MF, OBJ or PLY file.
 
     Of a lattice, described as for "build" by options or in a TOML file: pictures, wall thickness, pore sizes, density,
     areas, exact against fitted, element quality, print check. Of a file, named in place of LATTICE.toml: pictures,

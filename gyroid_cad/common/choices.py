@@ -10,11 +10,26 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-__all__ = ["FITS", "KINDS", "SCHEMAS", "SURFACE_NAMES", "TRIMS", "FitName", "Kind", "Schema", "SurfaceName", "Trim"]
+__all__ = [
+    "FITS",
+    "KINDS",
+    "ROUTES",
+    "SCHEMAS",
+    "SURFACE_NAMES",
+    "TRIMS",
+    "FitName",
+    "Kind",
+    "Route",
+    "Schema",
+    "SurfaceName",
+    "Trim",
+]
 
 Kind = Literal["sheet", "network-a", "network-b", "channels", "surface"]
 SurfaceName = Literal["gyroid", "diamond", "primitive"]
 Trim = Literal["box"]
+# To a filled part: through exact solids, or through triangles alone.
+Route = Literal["brep", "triangles"]
 # Of STEP files.
 Schema = Literal["ap214", "ap242"]
 # On the command line, where no FitSettings can be given.
@@ -24,4 +39,5 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 SURFACE_NAMES: tuple[SurfaceName, ...] = get_args(SurfaceName)
 TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)
+ROUTES: tuple[Route, ...] = get_args(Route)
 FITS: tuple[FitName, ...] = get_args(FitName)

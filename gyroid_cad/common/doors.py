@@ -79,6 +79,7 @@ _FIT = _but_python("in `fit`, a `FitSettings`")
 _COMPLEMENT = _but_python("`density=1 - porosity`")
 _WRITING = _but_hosts("the host's exporters write")
 _NO_PROGRESS = _but_hosts("the host's methods show none")
+_NO_TRIANGLES = _but_hosts("a host's shape needs a B-rep, which triangles are not")
 _OF_PAPER = _but_hosts("`Lattice.paper(...)`, then `to_cadquery` or `to_build123d`")
 _OF_BLOCK = _but_python("in `lattice`, a `Lattice`")
 _CHECK = {"python": Absent("`print_check(made, printer)`")}
@@ -144,9 +145,11 @@ FILL = (
     _row("openings", "--opening"),
     _row("core"),
     _row("solids", "--solid"),
+    _row("partial"),
     _row("origin"),
     _row("rotation"),
     _row("drop islands"),
+    _row("route", **_NO_TRIANGLES),
     _row("material density", cadquery=Absent("a workplane keeps no report")),
     _row("lattice", Absent("described by `--cells` and what goes with it")),
     _row("cells", **_OF_BLOCK),

@@ -35,7 +35,9 @@ __all__ = [
     "MFEM_FIELD",
     "NASTRAN",
     "NPZ",
+    "OBJ",
     "PART_FORMATS",
+    "PLY",
     "PNG",
     "STEP",
     "STL",
@@ -80,6 +82,8 @@ STEP = Format("STEP", (".step", ".stp"), "solid")
 BREP = Format("BREP", (".brep",), "solid")
 STL = Format("STL", (".stl",), "triangles")
 THREE_MF = Format("3MF", (".3mf",), "triangles")
+OBJ = Format("OBJ", (".obj",), "triangles")
+PLY = Format("PLY", (".ply",), "triangles")
 VTU = Format("VTU", (".vtu",), "mesh")
 GMSH = Format("Gmsh", (".msh",), "mesh")
 ABAQUS = Format("Abaqus, CalculiX", (".inp",), "mesh")
@@ -97,8 +101,7 @@ TOML = Format("TOML", (".toml",), "lattice")
 FORMATS = (
     STEP,
     BREP,
-    STL,
-    THREE_MF,
+    *(STL, THREE_MF, OBJ, PLY),
     *(VTU, GMSH, ABAQUS, ANSYS, NASTRAN),
     *(MFEM, GISMO, JSON, NPZ, MFEM_FIELD),
     *(HTML, PNG, TOML),
@@ -127,7 +130,7 @@ def format_of(path: str | os.PathLike[str]) -> Format | None:
     --------
     >>> format_of("Bracket.STP").name
     'STEP'
-    >>> format_of("bracket.obj")
+    >>> format_of("bracket.dwg")
     """
     return _OF_ENDING.get(Path(path).suffix.lower())
 
@@ -138,9 +141,9 @@ def listed_endings(formats: Sequence[Format]) -> str:
     Examples
     --------
     >>> listed_endings(TRIANGLE_FORMATS)
-    '.stl or .3mf'
+    '.stl, .3mf, .obj or .ply'
     >>> listed_endings(PART_FORMATS)
-    '.step, .stp, .brep, .stl or .3mf'
+    '.step, .stp, .brep, .stl, .3mf, .obj or .ply'
     """
     *others, last = [ending for form in formats for ending in form.endings]
     return f"{', '.join(others)} or {last}" if others else last

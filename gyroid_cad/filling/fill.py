@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,14 +14,18 @@ from numpy.typing import NDArray
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import Kind, Schema, SurfaceName
+from gyroid_cad.common.choices import ROUTES, Kind, Route, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
-from gyroid_cad.common.progress import Progress, named_progress, timed
-from gyroid_cad.errors import KernelError, ParameterError, PartWarning
+from gyroid_cad.common.progress import Progress, named_progress, report_progress, timed
+from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.infill import described_infill, require_cover
-from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
-from gyroid_cad.filling.report import FillReport, joint_report
+from gyroid_cad.filling.distance_skin import Shell
+from gyroid_cad.filling.forecast import require_cover
+from gyroid_cad.filling.infill import described_infill
+from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_islands, without_specks
+from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
+from gyroid_cad.filling.triangle_part import naming_triangles
+from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
@@ -189,6 +192,9 @@ def fill(
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
     solids: Sequence[str | int] = (),
+    partial: bool = False,
+    route: Route = "brep",
+    deviation: float | None = None,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -230,13 +236,21 @@ def fill(
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
         A block of cells with whatever varies in it, maps of space too, instead of an endless lattice: then cell
-        size, thickness, density and surface are its own. It is placed by its own origin and rotation first.
+        size, thickness, density and surface are its own. It is placed by its own origin and rotation first. Cells are
+        added round it until it covers the part, as far as its fields and its map go on.
     surface : {"gyroid", "diamond", "primitive"}
     keep_islands : bool
         Keep every island, however small.
     solids : sequence of str or int
         Which of the part's solids are filled: names that its file or assembly gives them, or numbers from 1. All of
         them if left out.
+    partial : bool
+        Fill what the given lattice reaches, even if that is not all of the part; the report says how much it is not.
+    route : {"brep", "triangles"}
+        Through exact solids; or through triangles alone, for what is printed: the part may be an STL, 3MF, OBJ or PLY
+        file, and what comes out is no :class:`Filled` but :class:`~gyroid_cad.FilledTriangles`.
+    deviation : float, optional
+        Of the triangles of that route, in mm; of the other, :meth:`Filled.write` takes it.
 
     Returns
     -------
@@ -264,10 +278,22 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    regions, size, settings, infill_in = described_infill(
-        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen
+    if route not in ROUTES:
+        raise ParameterError("route", route, " or ".join(ROUTES))
+    regions, size, settings, foreseen, infill_in = described_infill(
+        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
-    parts, remarks = parts_of(part, solids)
+    if route == TRIANGLES:
+        cover = functools.partial(require_cover, cell_size=size, control_points=settings.control_points)
+        given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
+        job = TriangleJob(kind, size, regions, infill_in, *given)
+        # Not of the class, but with all of it that needs no B-rep.
+        return job.filled(part, solids, Shell(shell, openings, core))  # type: ignore[return-value]
+    if deviation is not None:
+        raise ParameterError("deviation", deviation, "none at route brep, whose solids write(deviation=...) meshes")
+    report_progress(progress, "read", 0, 1)
+    parts, remarks = bodies_of(part, solids)
+    report_progress(progress, "read", 1, 1)
     if core is not None and len(parts) > 1:
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
@@ -275,12 +301,12 @@ def fill(
     made, islands = [], Islands()
     for (name, whole), faces in zip(parts, _opened(parts, openings), strict=True):
         told = progress if len(parts) == 1 else named_progress(progress, name)
-        if lattice is None:
-            require_cover(whole.low, whole.high, size, settings.control_points)
-        hollow = _hollow(whole, shell, faces, core)
-        inner = whole if hollow is None else hollow.core
-        filling = Filling(whole, hollow, regions, partial(infill_in, inner), size, told)
-        with _naming(name if len(parts) > 1 else ""):
+        forecast = foreseen(whole)
+        report_progress(told, str(forecast), 0, round(forecast.seconds))
+        with naming_triangles(kind, name if len(parts) > 1 else ""):
+            hollow = _hollow(whole, shell, faces, core)
+            inner = whole if hollow is None else hollow.core
+            filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
         domains, voids = without_specks(domains, filling)
@@ -289,6 +315,7 @@ def fill(
     islands.warn("drop_islands drops")
     together = _together(made, remarks)
     warn_of_voids(together.report.voids)
+    warn_of_uncovered(together.report.uncovered)
     return together
 
 
@@ -309,15 +336,6 @@ def _opened(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[
         return [selected_faces(part, openings) for _, part in parts]
     faces = selected_faces(require_part(compound_of(part.shape for _, part in parts)), openings)
     return [[face for face in faces if has_face(part, face)] for _, part in parts]
-
-
-@contextmanager
-def _naming(body: str) -> Iterator[None]:
-    """Say which of several bodies the kernel failed with."""
-    try:
-        yield
-    except KernelError as failed:
-        raise (KernelError(f"{body}: {failed}") if body else failed) from failed.__cause__
 
 
 def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
@@ -377,5 +395,6 @@ def _reported(
         shift=(x, y, z),
         seconds=dict(filling.seconds),
         cells_alike=outcome.infill.grading.cells_alike,
+        uncovered=outcome.infill.uncovered,
     )
     return Filled(shapes, report)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial as partial_of
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind
-from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
-from gyroid_cad.filling.extent import extent_of
+from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
+from gyroid_cad.filling.forecast import Forecast, forecast_of
 from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -35,20 +35,21 @@ from gyroid_cad.wall.covering import (
 )
 from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
-from gyroid_cad.wall.fitted import fit_wall
+from gyroid_cad.wall.fitted import LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
+from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_cover"]
+__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_thicker"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 _BLOCK_SAMPLES = 13
-# Peak memory of filling and writing, for each cell of the box round a part, as measured, rounded up.
-_BYTES_PER_CELL = 10_000_000
+# Places of a part that tell what of it a block covers; and how often the block is cut back where its wall would fold.
+_COVER_POINTS, _MOST_CUTS = 2000, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +69,8 @@ class Infill:
         Wall in mm.
     endless : bool
         Whether it goes on beyond its patches; else it ends at its free side walls.
+    uncovered : float
+        Share of the part that it does not reach.
     """
 
     frame: Frame
@@ -77,6 +80,7 @@ class Infill:
     min_thickness: float
     max_thickness: float
     endless: bool
+    uncovered: float = 0.0
 
     def sides(self, distance: Any, contains: Any) -> Integers:
         """Side of a part on which each patch lies, or that it may be crossed, as :func:`covering.patch_sides` tells."""
@@ -129,7 +133,16 @@ class Infill:
         ]
 
 
-InfillIn = Callable[[Part, Frame, Timed], Infill]
+class Foreseen(Protocol):
+    """Tells what filling a part takes, and refuses one that memory would not hold, or that is thinner than the wall."""
+
+    def __call__(self, part: Part) -> Forecast: ...
+
+
+class InfillIn(Protocol):
+    """Gives the lattice for a part and a frame, each stage timed, with a uniform wall of so many mm at least."""
+
+    def __call__(self, part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill: ...
 
 
 def described_infill(
@@ -141,8 +154,9 @@ def described_infill(
     tolerance: float | None,
     lattice: Lattice | None,
     surface: MinimalSurface,
-) -> tuple[tuple[Region, ...], float, FitSettings, InfillIn]:
-    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame.
+    partial: bool = False,
+) -> tuple[tuple[Region, ...], float, FitSettings, Foreseen, InfillIn]:
+    """The regions wanted, the cell size, the fit, what a part would take, and how the lattice is to be had for one.
 
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
@@ -154,30 +168,75 @@ def described_infill(
         if kind != SHEET:
             raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
         regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
-        return regions.regions, lattice.cell_size, fit, lambda part, frame, timed: block_infill(lattice, frame)
+
+        def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
+            return block_infill(lattice, part, frame, timed, partial)
+
+        uniform = lattice.wall_thickness if lattice.uniform else 0.0
+        own = lattice.cell_size, uniform, lattice.thickness, lattice.density
+        foreseen = partial_of(_foreseen, lattice.grading().cells_alike, lattice.fit.control_points, *own)
+        return regions.regions, lattice.cell_size, fit, foreseen, block
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
     settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
     closeness = tolerance or USUAL_TOLERANCE
 
-    def endless(part: Part, frame: Frame, timed: Timed) -> Infill:
-        made = endless_infill(part, frame, size, wanted, settings, closeness, timed, surface)
-        smallest = float(np.min(part.high - part.low))
-        if smallest <= made.max_thickness:
-            name, given = ("thickness", thickness) if density is None else ("density", density)
-            raise ParameterError(
-                name,
-                given,
-                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
-            )
+    def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
+        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
+        require_thicker(part, made.max_thickness, thickness, density)
         return made
 
-    return wanted.regions, size, settings, endless
+    uniform = wanted.thickness if isinstance(wanted.thickness, float) else 0.0
+    foreseen = partial_of(_foreseen, True, settings.control_points, size, uniform, thickness, density)
+    return wanted.regions, size, settings, foreseen, endless
+
+
+def _foreseen(
+    without_end: bool,
+    control_points: int,
+    cell_size: float,
+    wall: float,
+    thickness: FieldLike | None,
+    density: FieldLike | None,
+    part: Part,
+) -> Forecast:
+    forecast = forecast_of(part, cell_size, control_points)
+    if without_end:
+        forecast.require_memory(cell_size)
+    require_thicker(part, wall, thickness, density)
+    return forecast
+
+
+def require_thicker(
+    part: Part | BoundedExtent, wall: float, thickness: FieldLike | None, density: FieldLike | None
+) -> None:
+    """Check that a part is somewhere thicker than the wall that is to fill it.
+
+    Parameters
+    ----------
+    part : Part or BoundedExtent
+        Of the latter the box is looked at.
+    wall : float
+        Whole wall where it is thickest, in mm; 0 where that is not known yet.
+    thickness, density : number or field, optional
+        As the user gave it.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not wall:
+        return
+    thickest = part.thickest(wall) if isinstance(part, Part) else float(np.min(part.high - part.low))
+    if thickest <= wall:
+        name, given = ("thickness", thickness) if density is None else ("density", density)
+        accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
+        raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def endless_infill(
-    part: Part,
+    part: Part | BoundedExtent,
     frame: Frame,
     cell_size: float,
     regions: Regions,
@@ -190,7 +249,7 @@ def endless_infill(
 
     Parameters
     ----------
-    part : Part
+    part : Part or BoundedExtent
     frame : Frame
     cell_size : float
         In mm.
@@ -213,7 +272,7 @@ def endless_infill(
     grading = Grading(cell_size, thickness, density, surface=surface)
     try:
         with timed("cover"):
-            if not grading.uniform:
+            if not (grading.uniform and isinstance(part, Part)):
                 grading = replace(grading, extent=PlacedExtent(extent_of(part, cell_size), frame))
             min_thickness, max_thickness = wall_extremes(low, high, frame, grading)
             complex = covering_complex(low, high, frame, cell_size, max_thickness / 2, surface, grading.extent)
@@ -225,45 +284,96 @@ def endless_infill(
     return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
 
 
-def require_cover(low: Floats, high: Floats, cell_size: float, control_points: int) -> None:
-    """Check that there is memory for the cells that cover a part, before any of them is made.
+def block_infill(
+    lattice: Lattice, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool = False
+) -> Infill:
+    """A lattice that was described as a block of cells, with whatever varies in it, as far as a part needs it.
 
-    Parameters
-    ----------
-    low, high : ndarray, shape (3,)
-        Corners of the box round the part, in mm.
-    cell_size : float
-        In mm.
-    control_points : int
-        Of a patch, along a side.
-
-    Raises
-    ------
-    ParameterError
-        Saying how many cells that would be, and which size would do.
-    """
-    count = float(np.prod(np.maximum((high - low) / cell_size, 1)))
-    each = _BYTES_PER_CELL * max(1.0, (control_points / 10) ** 2)
-
-    def accepted(left: int) -> str:
-        return f"at least about {cell_size * (count * each / max(left, each)) ** (1 / 3):.3g} mm for this part"
-
-    require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
-
-
-def block_infill(lattice: Lattice, frame: Frame) -> Infill:
-    """A block of cells that was described as a lattice, with whatever varies in it.
+    Where its cells are alike it goes on for ever. Else cells are added round the block as far as its map goes on.
 
     Parameters
     ----------
     lattice : Lattice
+    part : Part or BoundedExtent
     frame : Frame
         That the lattice is placed by, wherever it stands in its own space.
+    timed : callable
+        A context for each stage, by its name.
+    partial : bool
+        Whether some of the part may be out of reach.
+
+    Raises
+    ------
+    ParameterError
+        If it is, and may not be, saying how much and where.
+    SelfIntersectionError, FitError
     """
-    fitted = lattice.fitted().at_home()
-    frame = lattice.spec().frame.within(frame)
-    wall = fitted.wall.moved(frame.rotation, frame.origin)
-    return Infill(frame, fitted.spec.grading, fitted.complex, wall, fitted.min_thickness, fitted.max_thickness, False)
+    spec = lattice.spec()
+    frame, grading = spec.frame.within(frame), spec.grading
+    if not grading.cells_alike:
+        return _mapped_infill(spec, part, frame, timed, partial)
+    back = Frame(frame.own(np.zeros(3)), frame.rotation.T)
+    thickness, density = (_in_frame(value, back) for value in (grading.thickness, grading.density))
+    regions = Regions((), thickness, density)
+    return endless_infill(
+        part, frame, spec.grading.cell_size, regions, spec.settings, spec.tolerance, timed, grading.surface
+    )
+
+
+def _mapped_infill(spec: LatticeSpec, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool) -> Infill:
+    """A block that a scale or a map carries, with cells added round it, until the part is covered or they end."""
+    with timed("cover"):
+        extent = PlacedExtent(extent_of(part, spec.grading.cell_size), frame)
+        grading = replace(spec.grading, extent=MappedExtent(extent, spec.grading))
+        held = part.points_inside(_COVER_POINTS)
+        wanted = preimages(spec.grading, spec.cells, frame.own(held))
+        skin = preimages(spec.grading, spec.cells, frame.own(part.surface_samples(spec.grading.cell_size)[0]))
+    limits, refit, reason = np.array([[-np.inf] * 3, [np.inf] * 3]), None, "where its map ends"
+    while refit is None:
+        with timed("cover"):
+            complex = block_round(grading, spec.cells, extent, np.concatenate([wanted, skin]), limits)
+            out = held[uncovered(grading, complex, spec.cells, wanted)]
+        share = len(out) / max(len(held), 1)
+        try:
+            if share and not partial:
+                # Where the wall would fold the block ends sooner: then still less of the part is within reach.
+                require_simple(complex, grading)
+                shown = ", ".join(f"{round(number, 6) + 0.0:.6g}" for number in _amid(out))
+                accepted = (
+                    f"a block that covers the part, or partial: {100 * share:.2g} % of it is out of reach, {reason}"
+                )
+                raise ParameterError("cells", spec.cells, f"{accepted}, about ({shown}) mm")
+            wall, refit = fit_wall(complex, grading, spec.settings, spec.tolerance, timed)
+        except SelfIntersectionError as error:
+            nearer = _short_of(np.array(error.place), spec, limits)
+            if nearer is None:
+                raise
+            limits, reason = nearer, error.reason
+    placed = wall.moved(frame.rotation, frame.origin)
+    return Infill(frame, grading, complex, placed, refit.min_thickness, refit.max_thickness, False, share)
+
+
+def _amid(points: Floats) -> list[float]:
+    """The one of some points that is nearest to their middle."""
+    found: list[float] = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))].tolist()
+    return found
+
+
+def _short_of(place: Floats, spec: LatticeSpec, limits: Floats) -> Floats | None:
+    """Limits within which there is nothing of a place beyond the block; None of a place in the block itself."""
+    size = spec.grading.cell_size
+    ends = np.array([[0, 0, 0], spec.cells]) * size
+    beyond = np.where(spec.grading.closed, -np.inf, np.array([ends[0] - place, place - ends[1]]))
+    side, axis = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    if beyond[side, axis] <= 0 or limits[side, axis] == ends[side, axis]:
+        return None
+    inwards, cut = 1 - 2 * side, limits.copy()
+    cell = np.ceil(place[axis] * inwards / size) * size * inwards
+    if cell * inwards <= limits[side, axis] * inwards:
+        # What reaches out of the cells within the limit folds.
+        cell = limits[side, axis] + inwards * size
+    cut[side, axis] = inwards * min(inwards * cell, inwards * ends[side, axis])
+    return cut
 
 
 def _in_frame(value: float | Field | None, frame: Frame) -> float | Field | None:

@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+<<<<<<< HEAD
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import KernelError
+=======
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
+from gyroid_cad.common.progress import Progress, report_progress, timed
+from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.extent import PartExtent
+>>>>>>> main
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
@@ -28,7 +35,17 @@ from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
 from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
 
-__all__ = ["Filling", "Made", "Outcome", "part_of", "parts_of", "without_islands", "without_specks"]
+__all__ = [
+    "Filling",
+    "Made",
+    "Outcome",
+    "bodies_of",
+    "part_of",
+    "shapes_of",
+    "solid_names",
+    "without_islands",
+    "without_specks",
+]
 
 Floats = NDArray[np.float64]
 
@@ -121,9 +138,22 @@ class Filling:
         if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
             attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
+<<<<<<< HEAD
             partial(self._filled, frame, np.array(phase) * self.cell_size, points, road, processes)
             for road, phase, processes in attempts
+=======
+            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
+            for number, (phase, by_sections, processes) in enumerate(attempts, 1)
+>>>>>>> main
         )
+
+    def _attempt(self, number: int, *given: Any) -> Outcome:
+        """Fill, and announce it where it fails: another attempt takes as long again."""
+        try:
+            return self._filled(*given)
+        except KernelError as failed:
+            report_progress(self.progress, f"attempt {number} failed, the next one follows: {failed}", 1, 1)
+            raise
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
@@ -229,7 +259,7 @@ def _without(made: Made, shells: Sequence[KernelShape]) -> Made:
     return Made(without_shells(made.shape, shells), made.volume + volume, made.area - area)
 
 
-def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
+def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
     """The closed, valid solids of whatever a user gives as a part, each by itself; those that overlap are united.
 
     Parameters
@@ -252,15 +282,27 @@ def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[s
     ExportError
         If a file is neither STEP nor BREP, or holds no shape.
     """
-    chosen = [solids] if isinstance(solids, str | int) else list(solids)
-    named = read_named(given) if isinstance(given, str | os.PathLike) else named_shapes(given)
-    separate, remarks = separate_solids(*named, chosen)
+    separate, remarks = separate_solids(*shapes_of(given), solid_names(solids))
     return [(name, require_part(solid)) for name, solid in separate], remarks
+
+
+def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]]]:
+    """The kernel's shapes of whatever a user gives as a part, unchecked, and the names of each."""
+    if not isinstance(given, str | os.PathLike):
+        return named_shapes(given)
+    if format_of(given) in TRIANGLE_FORMATS:
+        raise ParameterError("part", str(given), 'a STEP or BREP file; triangles are filled by route="triangles"')
+    return read_named(given)
+
+
+def solid_names(solids: Sequence[str | int]) -> list[str | int]:
+    """Names or numbers of the solids that are wanted, be it one alone."""
+    return [solids] if isinstance(solids, str | int) else list(solids)
 
 
 def part_of(given: Any) -> Part:
     """The same as one part."""
-    parts, _ = parts_of(given)
+    parts, _ = bodies_of(given)
     return parts[0][1] if len(parts) == 1 else require_part(compound_of(part.shape for _, part in parts))
 
 

@@ -7,11 +7,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.choices import Kind
+from gyroid_cad.common.choices import Kind, Route
 from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
-from gyroid_cad.trim.islands import SealedVoid
+from gyroid_cad.errors import PartWarning
+from gyroid_cad.trim.islands import SealedVoid, warn_caller
 
-__all__ = ["FillReport", "joint_report"]
+__all__ = ["FillReport", "joint_report", "warn_of_uncovered"]
 
 # Of several bodies these add up.
 _SUMMED = (
@@ -75,10 +76,18 @@ class FillReport:
         By stage.
     cells_alike : bool
         False where a scale field or a map makes cells of other sizes.
+    uncovered : float
+        Share of the part that the given lattice does not reach.
     bodies : int
         Solids of the part, each of which was filled by itself.
     remarks : tuple of str
         On what was repaired or united before that.
+    route : {"brep", "triangles"}
+        At the latter ``faces`` counts triangles, and patches are not told apart by the part's boundary.
+    deviation : float, optional
+        Of triangles from the lattice and the part, in mm, at that route.
+    fillet : float, optional
+        Radius with which wall and skin meet, in mm.
 
     Examples
     --------
@@ -120,8 +129,12 @@ class FillReport:
     shift: Point
     seconds: dict[str, float]
     cells_alike: bool
+    uncovered: float = 0.0
     bodies: int = 1
     remarks: tuple[str, ...] = ()
+    route: Route = "brep"
+    deviation: float | None = None
+    fillet: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -129,15 +142,15 @@ class FillReport:
 
     def rows(self) -> Rows:
         """Subject and finding, line by line, as they are printed."""
-        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
         of_part = f"{self.part_volume:.8g}, density {self.density:.5f}"
         return [
             ("kind", f"{self.kind}, {cell_shown(self.cell_size, self.cells_alike)}, wall {self.thickness:.6g} mm"),
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
-            *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
+            *([] if self.skin is None else [("skin", f"{self.skin:g} mm{self._rounded()}")]),
             *([] if self.bodies == 1 else [("bodies", f"{self.bodies}, each filled by itself")]),
+            *([("uncovered", f"{100 * self.uncovered:.3g} % of the part")] if self.uncovered else []),
             *(("part", remark) for remark in self.remarks),
-            ("solids, faces", f"{self.solids}, {self.faces} ({state})"),
+            self._counted(),
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
             ("area", f"{self.area:.6g} mm2"),
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
@@ -146,12 +159,28 @@ class FillReport:
             *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
         ]
 
+    def _rounded(self) -> str:
+        return "" if self.fillet is None else f", rounded by {self.fillet:g} mm where walls meet it"
+
+    def _counted(self) -> tuple[str, str]:
+        if self.route == "triangles":
+            within = f"closed, within {self.deviation:.3g} mm; no B-rep was made"
+            return "solids, triangles", f"{self.solids}, {self.faces:,} ({within})"
+        state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
+        return "solids, faces", f"{self.solids}, {self.faces} ({state})"
+
     def _voids_shown(self) -> str:
         shown = "; ".join(map(str, self.voids[:_VOIDS_SHOWN]))
         return f"{len(self.voids)} that no opening reaches: {shown}{'; ...' * (len(self.voids) > _VOIDS_SHOWN)}"
 
     def __str__(self) -> str:
         return text_table(self.rows())
+
+
+def warn_of_uncovered(share: float) -> None:
+    """Emit a :class:`~gyroid_cad.PartWarning` if some of a part is out of the lattice's reach."""
+    if share:
+        warn_caller(f"{100 * share:.3g} % of the part is out of the lattice's reach", PartWarning)
 
 
 def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:
@@ -177,6 +206,7 @@ def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> 
         thickness=max(report.thickness for report in reports),
         min_wall=min((report.min_wall for report in reports if report.min_wall is not None), default=None),
         density=sums["volume"] / sums["part_volume"],
+        uncovered=sum(report.uncovered * report.part_volume for report in reports) / sums["part_volume"],
         by_sections=all(report.by_sections for report in reports),
         shift=next((report.shift for report in reports if any(report.shift)), first.shift),
         seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -94,6 +94,11 @@ class Regions:
     def uniform(self) -> bool:
         """True where the wall is the same everywhere."""
         return not isinstance(self.thickness, Field | None)
+
+    def at_least(self, thickness: float) -> Regions:
+        """The same regions, a uniform wall of so many mm where theirs is thinner."""
+        thin = isinstance(self.thickness, float) and self.thickness < thickness
+        return replace(self, thickness=thickness) if thin else self
 
 
 def regions_of(

@@ -147,7 +147,7 @@ class _Realisation:
             return own
         # The curves stay the part's own, in space and on both faces.
         piece = as_edge(own.EmptyCopied())
-        self.builder.UpdateEdge(piece, BRep_Tool.Tolerance_s(own))
+        self.builder.UpdateEdge(piece, _MARGIN * self.read.boundary.deviation(edge.number))
         self.pieces_of.setdefault(edge.number, []).append((edge.first, self.number_of[edge]))
         return self._bounded(piece, self.vertex(edge.start), self.vertex(edge.end), edge.first, edge.last)
 

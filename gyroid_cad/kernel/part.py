@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,18 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.GeomAbs import GeomAbs_Plane
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
-from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID, TopAbs_VERTEX
-from OCP.TopExp import TopExp
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
@@ -29,14 +26,28 @@ from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, measure, parts_of
-from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
-from gyroid_cad.kernel.extent import bounding_box
+from gyroid_cad.kernel.compat import as_face, as_solid
+from gyroid_cad.kernel.extent import bounding_box, box_of
 from gyroid_cad.kernel.repair import fault_of
+from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
-from gyroid_cad.mesh.triangles.measures import SignedDistances, unmatched_edges
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.trim.box import Box
 
-__all__ = ["Part", "measure", "require_part", "selected_faces"]
+__all__ = [
+    "AS_FAR",
+    "ON_FACE",
+    "OPENINGS",
+    "Part",
+    "face_numbers",
+    "measure",
+    "points_within",
+    "require_part",
+    "selected_faces",
+    "selected_way",
+    "spread_points",
+    "triangles_of",
+]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -48,9 +59,11 @@ _ANGULAR_DEFLECTION = 0.5
 # beyond its deflection here and there: within so many times it the kernel is asked.
 _INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
-_BOX_FACES, _BOX_CORNERS = 6, 8
-# How far from square a box may be, in radians and in parts of its largest extent.
-_SQUARE = 1e-9
+# Where the thickness is looked at: at so many places at most, so many along the largest extent, by balls of which each
+# has so much of the last; and how near the next face they may come, in parts of their radius.
+_THICKNESS_PLACES, _THICKNESS_STEPS, _SMALLER, _AS_DEEP = 1500, 60, 0.9, 0.98
+# Of a part that takes up little of its box fewer points are found than are asked for.
+_MOST_BATCHES = 8
 
 
 # Without slots, so that its mesh is kept once it is made.
@@ -68,6 +81,8 @@ class Part:
         In mm3.
     box : Box, optional
         If the part is one solid and that is a box.
+    area : float
+        Of the boundary, in mm2.
     """
 
     shape: TopoDS_Shape
@@ -76,6 +91,7 @@ class Part:
     high: Floats
     volume: float
     box: Box | None = None
+    area: float = 0.0
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,).
@@ -116,6 +132,32 @@ class Part:
         BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, True)
         return _triangles(copy)
 
+    def points_inside(self, count: int) -> Floats:
+        """Points spread at random over the inside, the same ones each time; shape (n, 3), as many as are wanted."""
+        return points_within(self.low, self.high, self.contains, count)
+
+    def thickest(self, enough: float) -> float:
+        """About how thick the part is where it is thickest, in mm: the largest ball that fits into it.
+
+        Parameters
+        ----------
+        enough : float
+            A part that is thicker than this somewhere need not be known better.
+        """
+        smallest = float(np.min(self.high - self.low))
+        if self.box is not None or smallest <= enough:
+            return smallest
+        points, normals, _ = self.surface_samples(float(np.max(self.high - self.low)) / _THICKNESS_STEPS)
+        chosen = np.random.default_rng(0).permutation(len(points))[:_THICKNESS_PLACES]
+        points, normals = points[chosen], normals[chosen]
+        signed, band = self._signed_distances
+        if signed is None:
+            return smallest
+        radius = enough / 2 / _AS_DEEP
+        while not np.any(signed(points - radius * normals) <= band - _AS_DEEP * radius):
+            radius *= _SMALLER
+        return 2 * radius
+
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
 
@@ -132,9 +174,28 @@ class Part:
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
-        clouds = [_spread(*triangles, spacing) for triangles in self._meshed(deflection)]
+        clouds = [spread_points(*triangles, spacing) for triangles in self._meshed(deflection)]
         points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
         return points, normals, spacing + deflection
+
+
+def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
+    """Corners of triangles no further from a shape's faces than a deflection in mm; shape (triangles, 3, 3)."""
+    copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
+    # In one thread, so that a process may be forked from this one.
+    BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
+    return np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(copy))])
+
+
+def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:
+    """Points spread at random over what a box holds of something, as :meth:`Part.points_inside` gives them."""
+    random, found = np.random.default_rng(0), np.empty((0, 3))
+    for _ in range(_MOST_BATCHES):
+        points = random.uniform(low, high, (count, 3))
+        found = np.concatenate([found, points[contains(points)]])
+        if len(found) >= count:
+            break
+    return found[:count]
 
 
 def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
@@ -155,36 +216,10 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
         if fault := fault_of(solid, "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"):
             raise ParameterError(parameter, kind, fault)
     low, high = bounding_box(shape)
-    volume = sum(measure(solid)[0] for solid in solids)
+    volume, area = (sum(sizes) for sizes in zip(*map(measure, solids), strict=True))
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, low, high, volume, _box_of(solids))
-
-
-def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
-    """The box that the solids are, if they are one box: six planes, and eight corners where a box has them."""
-    if len(solids) != 1:
-        return None
-    faces = [as_face(face) for face in parts_of(solids[0], TopAbs_FACE)]
-    if len(faces) != _BOX_FACES or any(BRepAdaptor_Surface(face).GetType() != GeomAbs_Plane for face in faces):
-        return None
-    corners = NumberedShapes()
-    TopExp.MapShapes_s(solids[0], TopAbs_VERTEX, corners)
-    places = (BRep_Tool.Pnt_s(as_vertex(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
-    points = np.array([(place.X(), place.Y(), place.Z()) for place in places])
-    normals = [BRepAdaptor_Surface(face).Plane().Axis().Direction() for face in faces]
-    directions = np.array([(normal.X(), normal.Y(), normal.Z()) for normal in normals])
-    first = directions[0]
-    across = [direction for direction in directions if abs(direction @ first) < _SQUARE]
-    if len(points) != _BOX_CORNERS or not across:
-        return None
-    axes = np.stack([first, across[0], np.cross(first, across[0])], axis=1)
-    along = points @ axes
-    low, high = along.min(axis=0), along.max(axis=0)
-    size = float(np.max(high - low))
-    ends = np.minimum(np.abs(along - low), np.abs(along - high))
-    upper = {tuple(row) for row in (along > (low + high) / 2).tolist()}
-    return Box(axes, low, high) if ends.max() < _SQUARE * size and len(upper) == _BOX_CORNERS else None
+    return Part(divided, solids, low, high, volume, box_of(solids), area)
 
 
 def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
@@ -214,7 +249,7 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
         yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
 
 
-def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
+def spread_points(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
     """Points of triangles, their corners among them, so that no place is further than the spacing from one; normals."""
     normals = unit(np.cross(b - a, c - a))
     steps = [np.ceil(np.linalg.norm(end - a, axis=1) / spacing).astype(int).clip(1) for end in (b, c)]
@@ -233,9 +268,9 @@ def _spread(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Fl
     return points, np.concatenate(directions)[first]
 
 
-_ACCEPTED = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'
+OPENINGS = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'
 # In parts of the part's largest extent.
-_AS_FAR, _ON_FACE = 1e-6, 1e-3
+AS_FAR, ON_FACE = 1e-6, 1e-3
 
 
 def selected_faces(part: Part, openings: Sequence[Any]) -> list[TopoDS_Face]:
@@ -253,8 +288,30 @@ def selected_faces(part: Part, openings: Sequence[Any]) -> list[TopoDS_Face]:
     ParameterError
     """
     if isinstance(openings, str) or not isinstance(openings, Iterable):
-        raise ParameterError("openings", openings, f"a sequence of {_ACCEPTED}")
+        raise ParameterError("openings", openings, f"a sequence of {OPENINGS}")
     return [face for given in openings for face in _selected(part, given)]
+
+
+def face_numbers(shape: TopoDS_Shape, openings: Sequence[Any]) -> list[int]:
+    """Numbers of chosen faces, as :func:`gyroid_cad.kernel.stl.solid_triangles` counts them.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    openings : sequence
+        As of :func:`selected_faces`.
+
+    Raises
+    ------
+    ParameterError
+    """
+    low, high = bounding_box(shape)
+    chosen = selected_faces(Part(shape, (), low, high, 0.0), openings)
+    faces = [face for solid in parts_of(shape, TopAbs_SOLID) for face in parts_of(solid, TopAbs_FACE)]
+    numbers = [number for number, face in enumerate(faces) if any(face.IsSame(other) for other in chosen)]
+    if chosen and not numbers:
+        raise ParameterError("openings", openings, "faces of the part that is filled")
+    return numbers
 
 
 def _selected(part: Part, given: Any) -> list[TopoDS_Face]:
@@ -265,23 +322,32 @@ def _selected(part: Part, given: Any) -> list[TopoDS_Face]:
     if isinstance(shape, TopoDS_Shape):
         found = [] if shape.IsNull() else [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
         if not found:
-            raise ParameterError("openings", given, _ACCEPTED)
+            raise ParameterError("openings", given, OPENINGS)
         return found
     try:
         point = three_numbers("openings", given)
     except ParameterError:
-        raise ParameterError("openings", given, _ACCEPTED) from None
+        raise ParameterError("openings", given, OPENINGS) from None
     return [_nearest(part, faces, point)]
 
 
 def _furthest(part: Part, faces: list[TopoDS_Face], selector: str) -> list[TopoDS_Face]:
+    sign, axis = selected_way(selector)
+    reach = sign * np.array([_centre(face)[axis] for face in faces])
+    limit = reach.max() - AS_FAR * float(np.max(part.high - part.low))
+    return [faces[index] for index in np.flatnonzero(reach >= limit).tolist()]
+
+
+def selected_way(selector: str) -> tuple[float, int]:
+    """Sign and axis of a selector; raises ParameterError.
+
+    >>> selected_way(">Z"), selected_way("<X")
+    ((1.0, 2), (-1.0, 0))
+    """
     text = selector.strip().upper()
     if len(text) != 2 or text[0] not in "<>" or text[1] not in "XYZ":
-        raise ParameterError("openings", selector, _ACCEPTED)
-    sign = 1.0 if text[0] == ">" else -1.0
-    reach = sign * np.array([_centre(face)["XYZ".index(text[1])] for face in faces])
-    limit = reach.max() - _AS_FAR * float(np.max(part.high - part.low))
-    return [faces[index] for index in np.flatnonzero(reach >= limit).tolist()]
+        raise ParameterError("openings", selector, OPENINGS)
+    return 1.0 if text[0] == ">" else -1.0, "XYZ".index(text[1])
 
 
 def _centre(face: TopoDS_Face) -> tuple[float, float, float]:
@@ -301,7 +367,7 @@ def _nearest(part: Part, faces: list[TopoDS_Face], point: Floats) -> TopoDS_Face
     # Of a point much too far off the kernel finds no distance.
     distances = [found.Value() if found.IsDone() else np.inf for found in searches]
     nearest = int(np.argmin(distances))
-    if distances[nearest] > _ON_FACE * float(np.max(part.high - part.low)):
+    if distances[nearest] > ON_FACE * float(np.max(part.high - part.low)):
         shown = tuple(point.tolist())
         raise ParameterError("openings", shown, f"a point on a face; {_away(distances[nearest])}")
     return faces[nearest]

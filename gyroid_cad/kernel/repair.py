@@ -23,7 +23,7 @@ from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, to
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_shell
 from gyroid_cad.kernel.extent import box_round, corners_of
 
-__all__ = ["fault_of", "separate_solids"]
+__all__ = ["chosen_solids", "fault_of", "separate_solids"]
 
 # Gaps between faces that are sewn up, in parts of the largest extent.
 _SEWN = 1e-5
@@ -60,6 +60,24 @@ def separate_solids(
     ParameterError
         If there is none of a name, or no solid at all, or one cannot be mended: saying which, and where its fault is.
     """
+    remarks: list[str] = []
+    sound = [mended for named in chosen_solids(shapes, names, chosen) for mended in _sound(*named, remarks)]
+    separate: list[Named] = []
+    for own, solids, overlap in _united([solid for _, solid in sound]):
+        title = " and ".join(sound[index][0] for index in own)
+        separate += [(title, solid) for solid in solids]
+        if len(own) > 1:
+            remarks.append(f"{title} have {overlap:.4g} mm3 in common: united")
+    return separate, remarks
+
+
+def chosen_solids(
+    shapes: Sequence[TopoDS_Shape], names: Sequence[Sequence[str]], chosen: Sequence[str | int] = ()
+) -> list[Named]:
+    """The solids of shapes as they are, or those of them that are wanted, each with what to call it.
+
+    Parameters and errors are those of :func:`separate_solids`.
+    """
     found = [
         (known, solid)
         for shape, known in zip(shapes, names, strict=True)
@@ -69,15 +87,7 @@ def separate_solids(
     found = [one for one in found if one[1].ShapeType() == TopAbs_SOLID] or found
     titles = [_title(number, known, len(found)) for number, (known, _) in enumerate(found, 1)]
     wanted = _chosen(chosen, [known for known, _ in found], titles)
-    remarks: list[str] = []
-    sound = [named for index in wanted for named in _sound(titles[index], found[index][1], remarks)]
-    separate: list[Named] = []
-    for own, solids, overlap in _united([solid for _, solid in sound]):
-        title = " and ".join(sound[index][0] for index in own)
-        separate += [(title, solid) for solid in solids]
-        if len(own) > 1:
-            remarks.append(f"{title} have {overlap:.4g} mm3 in common: united")
-    return separate, remarks
+    return [(titles[index], found[index][1]) for index in wanted]
 
 
 def _title(number: int, names: Sequence[str], count: int) -> str:

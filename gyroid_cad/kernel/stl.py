@@ -17,14 +17,14 @@ from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.Poly import Poly_Triangulation
 from OCP.StlAPI import StlAPI_Writer
-from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
-from gyroid_cad.errors import ExportError
+from gyroid_cad.errors import ExportError, ParameterError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.extent import box_round, corners_of
@@ -35,9 +35,10 @@ from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.triangulation import parting
 
-__all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "write_meshed_stl"]
+__all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "solid_triangles", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # Parts of the deviation that are tried one after the other, until the mesh is closed.
 _FINER = (1.0, 0.5, 0.2, 0.05)
@@ -150,6 +151,42 @@ def meshed_by_face(
     counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
     faces = np.repeat(np.arange(len(counts)), counts)[kept]
     return vertices if away is None else vertices + away, triangles.astype(np.int32), faces
+
+
+def solid_triangles(shape: TopoDS_Shape, deviation: float) -> list[tuple[Floats, Integers, Integers]]:
+    """Triangles of each solid of a shape, meshed more finely where those of the kernel's mesher are open.
+
+    A solid that stays open comes as it is: who takes it may repair or refuse it.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    deviation : float
+        Of the triangles from the faces, in mm.
+
+    Returns
+    -------
+    list of (vertices, triangles, faces)
+        In mm, shape (vertices, 3); numbers of vertices, counterclockwise seen from outside, shape (triangles, 3); and
+        the face of each triangle, counted through all solids, shape (triangles,).
+
+    Raises
+    ------
+    ParameterError
+        If there is no solid.
+    """
+    found, count = [], 0
+    for solid in parts_of(shape, TopAbs_SOLID):
+        for finer in _FINER:
+            vertices, triangles, faces = meshed_by_face(solid, "part", deviation * finer)
+            if not unmatched_edges(triangles):
+                break
+        found.append((np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64), faces + count))
+        count += sum(1 for _ in parts_of(solid, TopAbs_FACE))
+    if not found:
+        kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
+        raise ParameterError("part", kind, "a closed solid: there is none in it")
+    return found
 
 
 def _brought_near(shape: TopoDS_Shape, deviation: float) -> Floats | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from math import pi, radians
+from math import inf, pi, radians
 from types import MappingProxyType
 from typing import Any
 
@@ -74,7 +74,9 @@ class Cylinder:
             cosine, sine, along = np.cos(rate * x), np.sin(rate * x), rate * (radius + z)
             return (-along * sine, 0, cosine), (along * cosine, 0, sine), (0, 1, 0)
 
-        return SpaceMap(function, jacobian, (closed, False, False), str(self))
+        low, high = _one_turn(size[0], rate, closed)
+        domain = (low, -inf, -radius), (high, inf, inf)
+        return SpaceMap(function, jacobian, (closed, False, False), str(self), domain)
 
     def __str__(self) -> str:
         return _spelled(self)
@@ -136,7 +138,9 @@ class Sphere:
                 (0, rise * level, north),
             )
 
-        return SpaceMap(function, jacobian, (closed, False, False), str(self))
+        (low, high), quarter = _one_turn(size[0], rate, closed), pi / 2 * radius
+        domain = (low, middle - quarter, -radius), (high, middle + quarter, inf)
+        return SpaceMap(function, jacobian, (closed, False, False), str(self), domain)
 
     def __str__(self) -> str:
         return _spelled(self)
@@ -144,12 +148,14 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """Turn the block about the upright axis through its middle, evenly with height.
+    """Turn the block about an upright axis, evenly with height.
 
     Parameters
     ----------
     angle : float
         In degrees, from the block's bottom to its top; a hundred turns at most.
+    x, y : float, optional
+        Where the axis stands, in mm; in the block's middle if left out.
 
     Examples
     --------
@@ -157,11 +163,18 @@ class Twist:
     >>> from gyroid_cad.maps import Twist
     >>> Lattice((1, 1, 2), 10, thickness=0.8, map=Twist(angle=30)) == Lattice((1, 1, 2), 10, 0.8, map="twist:angle=30")
     True
+    >>> str(Twist(angle=30, x=0, y=0))
+    'twist:angle=30.0,x=0.0,y=0.0'
     """
 
     angle: float
+    x: float | None = None
+    y: float | None = None
 
     def __post_init__(self) -> None:
+        for name in ("x", "y"):
+            if (place := getattr(self, name)) is not None:
+                object.__setattr__(self, name, _place_of_axis(name, place))
         angle = finite_number("angle", self.angle, "a finite number of degrees")
         if abs(angle) > _MOST_TWIST:
             raise ParameterError("angle", angle, f"-{_MOST_TWIST:,.0f} to {_MOST_TWIST:,.0f} degrees, a hundred turns")
@@ -169,7 +182,10 @@ class Twist:
 
     def over(self, size: Size) -> SpaceMap:
         """The twist of a block of this size."""
-        middle_x, middle_y, rate = size[0] / 2, size[1] / 2, radians(self.angle) / size[2]
+        middle_x, middle_y = (
+            extent / 2 if place is None else place for extent, place in zip(size, (self.x, self.y), strict=False)
+        )
+        rate = radians(self.angle) / size[2]
 
         def function(x: Floats, y: Floats, z: Floats) -> Sequence[ArrayLike]:
             cosine, sine, x, y = np.cos(rate * z), np.sin(rate * z), x - middle_x, y - middle_y
@@ -231,7 +247,9 @@ class Bend:
             cosine, sine = np.cos(turned), np.sin(turned)
             return (stretch * cosine, 0, -sine), (0, 1, 0), (stretch * sine, 0, cosine)
 
-        return SpaceMap(function, jacobian, (abs(self.angle) == FULL_TURN, False, False), str(self))
+        half, sides = pi * abs(radius), (-inf, level + radius) if radius > 0 else (level + radius, inf)
+        domain = (middle - half, -inf, sides[0]), (middle + half, inf, sides[1])
+        return SpaceMap(function, jacobian, (abs(self.angle) == FULL_TURN, False, False), str(self), domain)
 
     def __str__(self) -> str:
         return _spelled(self)
@@ -338,6 +356,20 @@ def _round(block_map: Cylinder | Sphere, length: float) -> tuple[float, bool]:
             f"or angle={FULL_TURN:g} to close them round this one",
         )
     return 1 / block_map.radius, False
+
+
+def _one_turn(length: float, rate: float, closed: bool) -> tuple[float, float]:
+    """Ends of what goes round once, as far beyond the one end of a block as beyond the other, in mm."""
+    half = length / 2 if closed else pi / rate
+    return length / 2 - half, length / 2 + half
+
+
+def _place_of_axis(name: str, value: object) -> float:
+    accepted = f"-{_LARGEST_RADIUS:,.0f} to {_LARGEST_RADIUS:,.0f} mm"
+    number = finite_number(name, value, accepted)
+    if abs(number) > _LARGEST_RADIUS:
+        raise ParameterError(name, number, accepted)
+    return number
 
 
 def _check_round(block_map: Cylinder | Sphere) -> None:

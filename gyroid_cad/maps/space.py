@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -17,7 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from gyroid_cad.common.checks import hashable
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["OPEN", "BlockMap", "JacobianFunction", "MapFunction", "Size", "SpaceMap", "carried", "differences"]
+__all__ = [
+    "EVERYWHERE",
+    "OPEN",
+    "BlockMap",
+    "JacobianFunction",
+    "MapFunction",
+    "Size",
+    "SpaceMap",
+    "carried",
+    "differences",
+]
 
 Floats = NDArray[np.float64]
 Size = tuple[float, float, float]
@@ -28,6 +39,7 @@ JacobianFunction = Callable[[Floats, Floats, Floats], Sequence[Sequence[ArrayLik
 _COMPARED_POINTS = 8
 _JACOBIAN_AGREEMENT = 1e-3
 OPEN = (False, False, False)
+EVERYWHERE = (3 * (-inf,), 3 * (inf,))
 
 
 @runtime_checkable
@@ -54,6 +66,9 @@ class SpaceMap:
         Along which axes the block's far end is carried exactly onto its near end, so that they are joined.
     text : str
         How it prints; the function's name if left out.
+    domain : tuple of tuple of float
+        Lowest and highest x, y and z, in mm, between which it carries no two places to one: so far it may go on beyond
+        the block, where a part asks for more.
 
     Raises
     ------
@@ -73,6 +88,7 @@ class SpaceMap:
     jacobian: JacobianFunction | None = None
     closed: tuple[bool, bool, bool] = OPEN
     text: str = ""
+    domain: tuple[tuple[float, ...], tuple[float, ...]] = EVERYWHERE
 
     def __post_init__(self) -> None:
         if not callable(self.function):

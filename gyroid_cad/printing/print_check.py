@@ -46,8 +46,22 @@ class FilledPart(Protocol):
     def deviation(self, given: float | None = None) -> float: ...
 
 
+@runtime_checkable
+class FilledMesh(Protocol):
+    """Stands for :class:`gyroid_cad.filling.triangles.FilledTriangles`, which is loaded with the kernel too."""
+
+    @property
+    def report(self) -> FillReport: ...
+
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...
+
+    @property
+    def triangles(self) -> NDArray[np.int64]: ...
+
+
 def print_check(
-    part: Lattice | FilledPart | str | os.PathLike[str] | tuple[NDArray[np.floating], NDArray[np.integer]],
+    part: Lattice | FilledPart | FilledMesh | str | os.PathLike[str] | tuple[NDArray[np.floating], NDArray[np.integer]],
     printer: str | Printer = "form2",
     deviation: float | None = None,
     progress: Progress | None = None,
@@ -62,7 +76,7 @@ def print_check(
     Parameters
     ----------
     part : Lattice, Filled, path-like, or (vertices, triangles)
-        A lattice; a filled part; an STL or 3MF file; or arrays of shapes (v, 3), in mm, and (t, 3).
+        A lattice; a filled part; an STL, 3MF, OBJ or PLY file; or arrays of shapes (v, 3), in mm, and (t, 3).
     printer : str or Printer
         A key of ``gyroid_cad/printing/printers.toml``, or the path of a TOML file of one's own.
     deviation : float, optional
@@ -98,12 +112,14 @@ def print_check(
             raise ParameterError("kind", part.report.kind, "one that is a solid: a bare surface cannot be printed")
         vertices, triangles = _triangles_of(part.solid(), part.deviation(deviation))
         min_wall = part.report.min_wall
+    elif isinstance(part, FilledMesh):
+        vertices, triangles, min_wall = part.vertices, part.triangles, part.report.min_wall
     elif isinstance(part, tuple):
         vertices, triangles = part
     elif isinstance(part, str | os.PathLike):
         vertices, triangles = read_triangles(part)
     else:
-        accepted = "a Lattice, a filled part, an STL or 3MF file, or arrays of vertices and triangles"
+        accepted = "a Lattice, a filled part, a file of triangles, or arrays of vertices and triangles"
         raise ParameterError("part", part, accepted)
     found = triangle_measures(vertices, triangles)
     ways = way_out(vertices, triangles) if found.closed and not found.inside_out else (None, None)

@@ -10,16 +10,19 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.render.drawing import draw
-from gyroid_cad.render.facets import facets_of_shape, facets_of_wall
+from gyroid_cad.render.facets import facets_of_shape, facets_of_triangles, facets_of_wall
 from gyroid_cad.render.picture import Vector, data_uri, png
 from gyroid_cad.wall.offset import Wall
 
 if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
-__all__ = ["MimeBundle", "mime_bundle", "shape_picture", "wall_picture"]
+__all__ = ["MimeBundle", "mime_bundle", "shape_picture", "triangles_picture", "wall_picture"]
 
 # What IPython takes: the data by media type, and what is to be known of them.
 MimeBundle = tuple[dict[str, Any], dict[str, Any]]
@@ -50,6 +53,25 @@ def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> 
         If the kernel's mesher fails.
     """
     return png(draw([facets_of_shape(shape)], size, camera))
+
+
+def triangles_picture(
+    vertices: NDArray[np.floating], triangles: NDArray[np.integer], size: tuple[int, int], camera: Vector
+) -> bytes:
+    """Closed triangles as a PNG file; no kernel is asked.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+    size : tuple of int
+        Width and height in pixels.
+    camera : tuple of float
+        Direction to the viewer.
+    """
+    return png(draw([facets_of_triangles(vertices, triangles, closed=True)], size, camera))
 
 
 def mime_bundle(title: str, rows: Callable[[], Sequence[tuple[str, str]]], picture: Callable[[], bytes]) -> MimeBundle:

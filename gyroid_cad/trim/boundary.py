@@ -25,6 +25,8 @@ _SAGS = (1e-3, 1e-7)
 # A place so many sags from a polygon is not told by it.
 _DOUBTFUL = 3.0
 _LEAST, _MOST = 9, 2**14
+# Along an edge, to see how far its curves are apart.
+_LOOKED_AT = 101
 _AT_ONCE = 2**21
 
 
@@ -211,6 +213,27 @@ class Boundary:
             for index, coedge in enumerate(face.coedges):
                 users[coedge.edge].append((number, index))
         return users
+
+    def deviation(self, edge: int) -> float:
+        """Largest distance of an edge's curve from its curves on the faces, in mm; its stated tolerance may be less.
+
+        The kernel looks at 23 places, where its reader of STEP made them agree.
+        """
+        if edge not in self._deviations:
+            own, worst = self.edges[edge], 0.0
+            assert own.curve is not None
+            t = np.linspace(own.first, own.last, _LOOKED_AT)
+            points = own.curve(t)[0]
+            for number, index in self.users[edge]:
+                face = self.faces[number]
+                away = face.surface.points(face.coedges[index].curve(t)[0]) - points
+                worst = max(worst, float(np.linalg.norm(away, axis=1).max()))
+            self._deviations[edge] = worst
+        return self._deviations[edge]
+
+    @cached_property
+    def _deviations(self) -> dict[int, float]:
+        return {}
 
 
 def _within(places: Floats, start: Floats, end: Floats) -> tuple[Booleans, Floats]:

@@ -40,6 +40,7 @@ __all__ = [
     "frame_of",
     "patch_sides",
     "periodic_offsets",
+    "periodic_patches",
     "placement",
     "wall_extremes",
 ]
@@ -339,7 +340,31 @@ def periodic_offsets(frame: Frame, cell_size: float, points: Floats, surface: Mi
     ndarray, shape (n,)
         In mm; positive on the side that the common normal points to.
     """
+    return _nearest_in_cell(cell_size, frame.own(points), surface)[0]
+
+
+def periodic_patches(cell_size: float, points: Floats, surface: MinimalSurface = USUAL) -> tuple[Integers, Integers]:
+    """Patches of the endless lattice that points of its own space are nearest to.
+
+    Parameters
+    ----------
+    cell_size : float
+        In mm.
+    points : ndarray, shape (n, 3)
+    surface : MinimalSurface
+
+    Returns
+    -------
+    placements : ndarray of int, shape (n,)
+    cells : ndarray of int, shape (n, 3)
+    """
+    _, patch, cell = _nearest_in_cell(cell_size, points, surface)
+    return cell.patch_placement[patch], cell.patch_cell[patch] + np.floor(points / cell_size).astype(np.int64)
+
+
+def _nearest_in_cell(cell_size: float, own: Floats, surface: MinimalSurface) -> tuple[Floats, Integers, CellComplex]:
+    """Offsets of points, brought into one cell, from the patches that come near it, the nearest of these, and all."""
     cell = covering_complex(np.zeros(3), np.full(3, cell_size), AT_HOME, cell_size, 0.0, surface)
     places, normals = patch_points_and_normals(cell, cell_size, np.linspace(-1, 1, _OFFSET_SAMPLES))
-    own = np.mod(frame.own(points), cell_size)
-    return nearest_offsets(places, normals, own)[0]
+    offsets, nearest = nearest_offsets(places, normals, np.mod(own, cell_size))
+    return offsets, nearest // _OFFSET_SAMPLES**2, cell

@@ -170,8 +170,8 @@ class Grading:
         jacobian: Floats | None = None
         determinant: Floats | float = 1.0
         if self.scale_field is not None:
-            images, jacobian = self._scaled(images)
             name = given_as("scale_field", self.scale_field)
+            images, jacobian = self._scaled(images, checked=True)
             determinant = _positive_determinant(name, jacobian, points)
         if self.map is not None:
             images, onward = carried("map", self.map, images, _STEP * self.cell_size)
@@ -179,7 +179,36 @@ class Grading:
             jacobian = onward if jacobian is None else np.einsum("ijn,jkn->ikn", onward, jacobian)
         return images, jacobian, determinant
 
-    def _scaled(self, places: Floats) -> tuple[Floats, Floats]:
+    def image(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Carry points as :meth:`carry` does, wherever they are and whatever becomes of space there.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+
+        Returns
+        -------
+        scaled : ndarray, shape (n, 3)
+            Before the map.
+        images : ndarray, shape (n, 3)
+        jacobian : ndarray, shape (n, 3, 3)
+
+        Raises
+        ------
+        ParameterError
+            If a field or the map gives no finite numbers.
+        """
+        scaled = np.ascontiguousarray(points.T)
+        jacobian = np.tile(np.eye(3)[..., np.newaxis], (1, 1, len(points)))
+        if self.scale_field is not None:
+            scaled, jacobian = self._scaled(scaled)
+        images = scaled
+        if self.map is not None:
+            images, onward = carried("map", self.map, scaled, _STEP * self.cell_size)
+            jacobian = np.einsum("ijn,jkn->ikn", onward, jacobian)
+        return scaled.T, images.T, np.moveaxis(jacobian, -1, 0)
+
+    def _scaled(self, places: Floats, checked: bool = False) -> tuple[Floats, Floats]:
         """p -> s(p) p, whose Jacobian is s I + p (grad s)^T."""
 
         name = given_as("scale_field", self.scale_field)
@@ -188,8 +217,9 @@ class Grading:
             return _values(name, self.scale_field, points.T)
 
         factor = scale(places)
-        _require(name, factor, places.T, 0.0, "above", "everywhere in the lattice")
-        self._require_scaled_cells(name, factor, places.T)
+        if checked:
+            _require(name, factor, places.T, 0.0, "above", "everywhere in the lattice")
+            self._require_scaled_cells(name, factor, places.T)
         slope = differences(scale, places, _STEP * self.cell_size)
         jacobian = places[:, np.newaxis] * slope
         for axis in range(3):

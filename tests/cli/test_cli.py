@@ -239,7 +239,7 @@ def test_the_config_of_an_assembly_makes_the_same_assembly(capsys: Captured, tmp
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "0"], ["--deviation = 0.0"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--deviation", "1e-7"], ["--deviation = 1e-07", "1e-06 mm"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--angle", "90"], ["--angle = 90.0"]),
-        (["build", "-o", "a.obj", *ONE_CELL, *WALL], ["-o = 'a.obj'", ".step, .stp, .brep, .stl or .3mf"]),
+        (["build", "-o", "a.dwg", *ONE_CELL, *WALL], ["-o = 'a.dwg'", ".step, .stp, .brep, .stl, .3mf, .obj or .ply"]),
         (["build", "-o", "a.step", "-o", "./a.step", *ONE_CELL, *WALL], ["-o = ", "each file once"]),
         (["build", "-o", "a.stl", *ONE_CELL, *WALL, "--instances"], ["-o = 'a.stl'", ".step or .stp"]),
         (["build", "-o", "a.step", *ONE_CELL, *WALL, "--trim", "box", "--instances"], ["--instances", "not trimmed"]),

@@ -171,11 +171,11 @@ def test_a_file_cut_short_is_refused(capsys: Captured, peg: Path, part: float) -
         (["--density", "0.3", "--angle", "90"], "--angle"),
         (
             ["--thickness", "6", "--cell-size", "20"],
-            "--thickness = '6': expected a wall below the part's smallest",
+            "--thickness = '6': expected a wall below the part's thickness",
         ),
         (
             ["--density", "0.9", "--cell-size", "20"],
-            "--density = '0.9': expected a wall below the part's smallest",
+            "--density = '0.9': expected a wall below the part's thickness",
         ),
         (["--density", "0.3 + q"], "--density"),
         (["--density", "0.3", "--skin", "-1"], "--skin = -1.0"),
@@ -200,11 +200,13 @@ def test_a_part_may_be_brep(capsys: Captured, block: Path) -> None:
     assert json.loads(done.out)["part_volume"] == pytest.approx(6 * 5 * 7)
 
 
-def test_triangles_are_no_part_and_the_message_says_what_is(capsys: Captured, tmp_path: Path) -> None:
+def test_triangles_are_no_part_of_a_step_file_and_the_message_says_which_route_takes_them(
+    capsys: Captured, tmp_path: Path
+) -> None:
     (tmp_path / "part.stl").write_text("solid a\nendsolid a\n")
     failed = run(capsys, tmp_path / "part.stl", "-o", tmp_path / "a.step", *FILL, "--density", "0.3")
-    assert failed.status == 1
-    assert "part.stl could not be read: it is STL by its ending, where STEP or BREP is needed" in failed.err
+    assert failed.status == 2
+    assert "part.stl': expected a STEP or BREP file; triangles fill by --route triangles, into .stl" in failed.err
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not STEP", b"ISO-10303-21;\nHEADER;\n"])

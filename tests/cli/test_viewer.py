@@ -276,7 +276,7 @@ def test_a_file_without_a_face_says_that_there_is_nothing_to_be_seen(
 @pytest.mark.parametrize(
     ("what", "picture", "words"),
     [
-        ("part.igs", None, "file = 'part.igs': expected a file ending in .step, .stp, .brep, .stl or .3mf"),
+        ("part.igs", None, "file = 'part.igs': expected a file ending in .step, .stp, .brep, .stl, .3mf, .obj or .ply"),
         ("missing.step", None, "file = 'missing.step': expected a file that exists"),
         ("missing.step", "a.jpg", "output = 'a.jpg': expected a file name ending in .png"),
         ("missing.step", "no/a.png", "existing folder"),
@@ -294,5 +294,9 @@ def test_names_that_will_not_do_are_refused_before_anything_is_drawn(
 def test_help_names_what_can_be_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "--help"]) == 0
     out = capsys.readouterr().out
-    for words in ("[LATTICE.toml|FILE]", ".step, .stp, .brep, .stl or .3mf", "-o, --output, --screenshot FILE.png"):
+    for words in (
+        "[LATTICE.toml|FILE]",
+        ".step, .stp, .brep, .stl, .3mf, .obj or .ply",
+        "-o, --output, --screenshot FILE.png",
+    ):
         assert words in out

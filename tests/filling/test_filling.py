@@ -230,15 +230,6 @@ def test_a_block_of_cells_round_the_part_fills_it_as_an_endless_lattice_does() -
     assert (block.solids, block.faces) == (filled().report.solids, filled().report.faces)
 
 
-def test_a_block_carried_by_a_map_ends_in_the_part_with_its_own_side_walls() -> None:
-    twisted = Lattice((1, 1, 1), CELL, WALL, map="twist:angle=20", tolerance=1e-3)
-    half = fill(ball(), lattice=twisted, origin=(5.0, 0, 0)).report
-    assert half.valid
-    assert half.closed
-    assert "cells of 10 mm before scaling or mapping, wall" in str(half)
-    assert 0 < half.volume < 0.6 * fill(ball(), CELL, WALL, fit=COARSE).report.volume
-
-
 def test_a_skin_is_kept_and_fused_with_what_fills_the_core() -> None:
     skin = 0.4
     inner = RADIUS - skin
@@ -320,7 +311,7 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"material_density": 7850}, "g/cm3, at most 100: of water it is 1"),
         ({"lattice": Lattice((1, 1, 1), 10, 1, scale_field=1e300), "cell_size": None, "thickness": None}, "at most 1"),
         ({"material_density": -1}, "material_density = -1"),
-        ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's smallest extent, 0.5 mm"),
+        ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's thickness, about 0.5 mm"),
     ],
 )
 def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], words: str) -> None:

@@ -103,6 +103,15 @@ def test_a_twist_keeps_volume_and_every_layers_lengths(angle: float, size: Size)
     np.testing.assert_array_equal(images[2], points[2])
 
 
+def test_a_twist_may_turn_about_any_upright_axis_and_leaves_that_where_it_is() -> None:
+    twist = Twist(angle=90, x=1, y=-2)
+    axis = np.array([[1.0, 1.0], [-2.0, -2.0], [0.0, 10.0]])
+    np.testing.assert_allclose(at(twist.over((10.0, 10.0, 10.0)), axis)[0], axis, atol=1e-12)
+    beside = at(twist.over((10.0, 10.0, 10.0)), np.array([[4.0], [-2.0], [10.0]]))[0]
+    np.testing.assert_allclose(beside, [[1.0], [1.0], [10.0]], atol=1e-12)
+    assert parse_map(str(twist)) == twist == parse_map("twist:angle=90,x=1,y=-2")
+
+
 @given(TWISTS, SIZES)
 def test_a_twist_turns_the_top_by_its_angle_against_the_bottom(angle: float, size: Size) -> None:
     middle = np.array([size[0] / 2, size[1] / 2])[:, np.newaxis]
@@ -261,7 +270,8 @@ def test_a_lattice_takes_a_map_by_its_spelling() -> None:
         *((text, "angle of (twist|bend) to be given") for text in ("twist", "bend:,,")),
         ("cylinder:radius=3,height=2", "radius and angle of cylinder, each once, not 'height=2'"),
         ("cylinder:radius=3,radius=3", "radius and angle of cylinder, each once, not 'radius=3'"),
-        ("twist:radius=3", "angle of twist, each once, not 'radius=3'"),
+        ("twist:radius=3", "angle and x and y of twist, each once, not 'radius=3'"),
+        *((f"twist:angle=3,x={bad}", "x: .*mm") for bad in ("nan", "inf", "1e8")),
         ("cylinder:30", "each once, not '30'"),
         *((f"sphere:radius={bad}", "a number for radius") for bad in ("", "x", "3mm", "3;angle=2", "None", "0x10")),
         *((f"cylinder:radius={bad}", "radius: .*mm") for bad in ("nan", "inf", "-inf", "0", "-3", "1e400")),

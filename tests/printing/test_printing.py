@@ -196,5 +196,5 @@ def test_a_printed_scale_is_never_rounded_to_where_it_would_fail() -> None:
 
 @pytest.mark.parametrize("part", [3, None, b"part.stl"])
 def test_what_is_no_part_is_refused(part: object) -> None:
-    with pytest.raises(ParameterError, match="a Lattice, a filled part, an STL or 3MF file, or arrays"):
+    with pytest.raises(ParameterError, match="a Lattice, a filled part, a file of triangles, or arrays"):
         print_check(part)  # type: ignore[arg-type]

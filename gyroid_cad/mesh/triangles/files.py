@@ -1,9 +1,11 @@
-"""Triangles read from STL and 3MF files, in millimetres."""
+"""Triangles read from STL, 3MF, OBJ and PLY files, in millimetres."""
 
 from __future__ import annotations
 
 import os
 import zlib
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import BadZipFile, ZipFile
@@ -12,30 +14,36 @@ import lib3mf
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.formats import THREE_MF, TRIANGLE_FORMATS, require_format
+from gyroid_cad.common.formats import OBJ, STL, THREE_MF, TRIANGLE_FORMATS, Format, require_format
 from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles"]
+__all__ = ["STL_RECORD", "binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 Real = TypeVar("Real", np.float32, np.float64)
 
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-_HEADER_BYTES = 84
+STL_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+STL_HEADER_BYTES = 84
 # Of 3MF, in bytes: 1 GB of it holds about fifteen million triangles, and text of numbers packs ten times or so.
 _MOST_UNPACKED, _MOST_PER_BYTE, _LEAST_ALLOWED = 1_000_000_000, 100, 10_000_000
-_EXPECTED = "a file of triangles, binary or text STL, or 3MF"
+_EXPECTED = "a file of triangles, binary or text STL, 3MF, OBJ or PLY"
 
 
-def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
-    """The triangles of an STL or 3MF file.
+def read_triangles(path: str | os.PathLike[str], form: Format | None = None) -> tuple[Floats, Integers]:
+    """The triangles of an STL, 3MF, OBJ or PLY file.
 
-    STL has no unit: its numbers are taken for millimetres, as printers' programs do. 3MF says its own, and where the
-    parts on its build platform stand. Corners of STL's triangles are one where their numbers are the same to the
-    last bit; triangles without area, which bound nothing, are left out.
+    STL, OBJ and PLY have no unit: their numbers are taken for millimetres, as printers' programs do. 3MF says its own,
+    and where the parts on its build platform stand. Corners are one where their numbers are the same to the last bit;
+    triangles without area, which bound nothing, are left out.
+
+    Parameters
+    ----------
+    path : path-like
+    form : Format, optional
+        Whatever the file's name ends in.
 
     Returns
     -------
@@ -49,10 +57,15 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
         If the file cannot be read, or holds no triangles.
     """
     target = Path(path)
-    form = require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
+    form = form or require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
     if reason := unreadable(path):
         raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {reason}")
-    vertices, triangles = _read_3mf(target) if form is THREE_MF else numbered_corners(_stl_corners(target))[:2]
+    if form is THREE_MF:
+        vertices, triangles = _read_3mf(target)
+    elif form is STL:
+        vertices, triangles, _ = numbered_corners(_stl_corners(target))
+    else:
+        vertices, triangles = _read_obj(target) if form is OBJ else _read_ply(target)
     if not len(triangles) or not np.isfinite(vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
     return vertices, triangles
@@ -61,15 +74,15 @@ def read_triangles(path: str | os.PathLike[str]) -> tuple[Floats, Integers]:
 def _stl_corners(path: Path) -> Floats:
     """Three corners of every triangle; shape (triangles, 3, 3)."""
     size = path.stat().st_size
-    if size >= _HEADER_BYTES:
-        count = int(np.fromfile(path, "<u4", 1, offset=_HEADER_BYTES - 4)[0])
+    if size >= STL_HEADER_BYTES:
+        count = int(np.fromfile(path, "<u4", 1, offset=STL_HEADER_BYTES - 4)[0])
         # Some programs begin binary files with "solid" too: the size tells them from text for certain.
-        if size == _HEADER_BYTES + count * _RECORD.itemsize:
+        if size == STL_HEADER_BYTES + count * STL_RECORD.itemsize:
             return binary_stl_corners(path).astype(float)
     try:
         with path.open("rb") as file:
             # What holds no text is not read as a whole, however large it is.
-            if not file.read(_HEADER_BYTES).lstrip().lower().startswith(b"solid"):
+            if not file.read(STL_HEADER_BYTES).lstrip().lower().startswith(b"solid"):
                 raise ValueError
         lines = path.read_text(encoding="ascii").split("\n")
         corners = [line.split()[1:] for line in lines if line.lstrip().startswith("vertex")]
@@ -80,13 +93,14 @@ def _stl_corners(path: Path) -> Floats:
 
 def binary_stl_corners(path: Path) -> NDArray[np.float32]:
     """Read the corners of all triangles of a binary STL file; shape (triangles, 3, 3)."""
-    return np.asarray(np.fromfile(path, _RECORD, offset=_HEADER_BYTES)["corners"])
+    return np.asarray(np.fromfile(path, STL_RECORD, offset=STL_HEADER_BYTES)["corners"])
 
 
 def keep_facets(path: Path, kept: Booleans) -> None:
     """Rewrite a binary STL file without the triangles that a mask, shape (triangles,), leaves out."""
     if not kept.all():
-        header, records = path.read_bytes()[: _HEADER_BYTES - 4], np.fromfile(path, _RECORD, offset=_HEADER_BYTES)[kept]
+        header = path.read_bytes()[: STL_HEADER_BYTES - 4]
+        records = np.fromfile(path, STL_RECORD, offset=STL_HEADER_BYTES)[kept]
         path.write_bytes(header + len(records).to_bytes(4, "little") + records.tobytes())
 
 
@@ -106,11 +120,136 @@ def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, B
     """
     # Minus zero is zero.
     flat = np.ascontiguousarray(corners.reshape(-1, 3) + corners.dtype.type(0))
-    keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
-    _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
-    triangles = numbers.reshape(-1, 3).astype(np.int64)
+    first, numbers = _distinct(flat)
+    triangles = numbers.reshape(-1, 3)
     kept = np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)
     return flat[first], triangles[kept], kept
+
+
+# Odd numbers of 64 bits without a pattern, by which the bits of coordinates are mixed.
+_MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+
+
+def _distinct(flat: NDArray[Real]) -> tuple[Integers, Integers]:
+    """Places where each distinct point is found first, and the number of every point among these.
+
+    Points are sorted by a mixture of their bits, a single number, which takes a fifth of the time; should two points
+    have one by chance, by all of their bits.
+    """
+    bits = flat.view(np.uint32 if flat.itemsize == 4 else np.uint64).astype(np.uint64)
+    mixed = np.zeros(len(flat), dtype=np.uint64)
+    for axis in range(3):
+        mixed ^= bits[:, axis]
+        mixed *= _MIXERS[axis]
+        mixed ^= mixed >> np.uint64(29)
+    _, first, numbers = np.unique(mixed, return_index=True, return_inverse=True)
+    if not np.array_equal(flat[first][numbers], flat):
+        keys = flat.view(np.dtype((np.void, flat.itemsize * 3))).ravel()
+        _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
+    return first, numbers.ravel().astype(np.int64)
+
+
+def _read_obj(path: Path) -> tuple[Floats, Integers]:
+    """Triangles of OBJ, larger polygons fanned out; corners counted from 1, or backwards from the last one, below 0."""
+    corners: list[list[str]] = []
+    faces: list[list[int]] = []
+    try:
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("v "):
+                corners.append(line.split()[1:4])
+            elif line.startswith("f "):
+                numbers = [int(word.partition("/")[0]) for word in line.split()[1:]]
+                numbers = [number - 1 if number > 0 else len(corners) + number for number in numbers]
+                faces += [[numbers[0], *pair] for pair in pairwise(numbers[1:])]
+        points, found = np.array(corners, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
+    except ValueError as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: {problem}") from None
+    return _with_corners(path, points, found)
+
+
+def _with_corners(path: Path, points: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+    """Corners numbered by their coordinates, as in STL: programs write one for each triangle, or for each normal."""
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(points):
+        raise ParameterError("file", str(path), f"{_EXPECTED}, whose triangles name corners that are there")
+    return numbered_corners(points[triangles])[:2]
+
+
+# Names of types in PLY, old and new.
+_PLY_TYPES = {
+    name: kind
+    for kind, names in {
+        "i1": "char int8",
+        "u1": "uchar uint8",
+        "i2": "short int16",
+        "u2": "ushort uint16",
+        "i4": "int int32",
+        "u4": "uint uint32",
+        "f4": "float float32",
+        "f8": "double float64",
+    }.items()
+    for name in names.split()
+}
+
+
+def _read_ply(path: Path) -> tuple[Floats, Integers]:
+    """Triangles of PLY, text or binary, of faces that all have as many corners as the first, fanned out."""
+    try:
+        table = _ply_table(path.read_bytes())
+        points = np.stack([np.asarray(table["vertex"][axis], dtype=float) for axis in "xyz"], axis=1)
+        faces = np.asarray(table["face"]["corners"], dtype=np.int64)
+        if np.any(np.asarray(table["face"]["corners count"]) != faces.shape[1]):
+            raise ValueError("its faces have different numbers of corners")
+    except (KeyError, IndexError, ValueError) as problem:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: not understood: {problem}") from None
+    fans = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
+    return _with_corners(path, points, np.concatenate([np.zeros((0, 3), dtype=np.int64), *fans]))
+
+
+def _ply_table(contents: bytes) -> dict[str, Any]:
+    """The elements of a PLY file, each with its fields by name."""
+    head, _, data = contents.partition(b"end_header")
+    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
+    order = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}[lines[1][1]]
+    body, at = data[data.index(b"\n") + 1 :], 0
+    words = [] if order else body.split()
+    elements = [line for line in lines if line[:1] in (["element"], ["property"])]
+    starts = [index for index, line in enumerate(elements) if line[0] == "element"]
+    table: dict[str, Any] = {}
+    for first, last in pairwise([*starts, len(elements)]):
+        name, count = elements[first][1], int(elements[first][2])
+        fields, size = _ply_fields(elements[first + 1 : last], order, body[at:], words[at:])
+        if order:
+            found = np.frombuffer(body, np.dtype(fields), count, at)
+            table[name], size = found, found.itemsize
+        else:
+            rows = np.array(words[at : at + count * size], dtype=float).reshape(count, size)
+            ends = np.cumsum([0, *(field[2][0] if len(field) > 2 else 1 for field in fields)])
+            table[name] = {
+                field[0]: rows[:, low:high] if len(field) > 2 else rows[:, low]
+                for field, (low, high) in zip(fields, pairwise(ends.tolist()), strict=True)
+            }
+        at += count * size
+    return table
+
+
+def _ply_fields(
+    properties: Sequence[Sequence[str]], order: str, body: bytes, words: Sequence[bytes]
+) -> tuple[list[tuple[Any, ...]], int]:
+    """Fields of one element of PLY, lists as long as in its first record, and how many numbers they are together."""
+    fields: list[tuple[Any, ...]] = []
+    count = 0
+    for line in properties:
+        if line[1] != "list":
+            fields.append((line[2], order + _PLY_TYPES[line[1]]))
+            count += 1
+            continue
+        name = "corners" if line[4] in ("vertex_indices", "vertex_index") else line[4]
+        kind = np.dtype((order or "<") + _PLY_TYPES[line[2]])
+        before = np.dtype(fields).itemsize
+        length = int(np.frombuffer(body, kind, 1, before)[0]) if order else int(words[count])
+        fields += [(f"{name} count", kind), (name, order + _PLY_TYPES[line[3]], (length,))]
+        count += 1 + length
+    return fields, count
 
 
 def _read_3mf(path: Path) -> tuple[Floats, Integers]:

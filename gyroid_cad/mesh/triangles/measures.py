@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, freeze_arrays
 from gyroid_cad.common.graph import connected
-from gyroid_cad.errors import GyroidError
+from gyroid_cad.mesh.triangles.distances import locator_of, vtk_module
 
 __all__ = [
-    "SignedDistances",
     "TriangleMeasures",
     "measured_walls",
     "surface_places",
@@ -228,8 +225,8 @@ def measured_walls(vertices: NDArray[np.floating], triangles: NDArray[np.integer
         If VTK is not installed.
     """
     points, facets = np.array(vertices, dtype=float, order="C"), np.array(triangles, dtype=np.int64, order="C")
-    core = _vtk("vtkCommonCore")
-    locator = _locator(points, facets)
+    core = vtk_module("vtkCommonCore")
+    locator = locator_of(points, facets)
     starts, inward, normals = surface_places(points, facets, places)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     starts = starts + _STARTS_INSIDE * size * inward
@@ -282,75 +279,6 @@ def _sharp_edges(points: Floats, facets: Integers, normals: Floats) -> tuple[Flo
     sharp = convex & (cosine > np.cos(_SHARP)) & (edges[one, 0] != edges[one, 1])
     cosine = np.minimum(cosine[sharp], 1 - _ROUNDING)
     return points[edges[one[sharp]]], np.sqrt(1 - cosine**2) / cosine
-
-
-class SignedDistances:
-    """Distances of points from closed triangles, below zero inside (``vtkImplicitPolyDataDistance``).
-
-    The side is told by the nearest triangle's normal, at edges and corners by the mean of those that meet there,
-    weighted by their angles: J. A. Baerentzen and H. Aanaes, Signed distance computation using the angle weighted
-    pseudonormal, IEEE TVCG 11 (2005). Of what the package depends on VTK alone tells distance and side at once, for
-    many points in one call.
-
-    Parameters
-    ----------
-    vertices : ndarray, shape (vertices, 3)
-        In mm.
-    triangles : ndarray of int, shape (triangles, 3)
-        Closed and counterclockwise seen from outside.
-
-    Raises
-    ------
-    GyroidError
-        If VTK is not installed.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> SignedDistances(corners, sides)(np.array([[0.1, 0.2, 0.3], [0.2, 0.2, -2.0]])).round(6).tolist()
-    [-0.1, 2.0]
-    """
-
-    def __init__(self, vertices: Floats, triangles: Integers) -> None:
-        points, facets = np.array(vertices, dtype=float, order="C"), np.array(triangles, dtype=np.int64, order="C")
-        self._function = _vtk("vtkFiltersCore").vtkImplicitPolyDataDistance()
-        self._function.SetInput(_poly_data(points, facets))
-
-    def __call__(self, points: Floats) -> Floats:
-        """Signed distances of points, shape (n, 3), in mm; shape (n,)."""
-        support, found = _vtk("util.numpy_support"), _vtk("vtkCommonCore").vtkDoubleArray()
-        if not len(points):
-            return np.empty(0)
-        self._function.FunctionValue(support.numpy_to_vtk(np.array(points, dtype=float, order="C")), found)
-        return np.array(support.vtk_to_numpy(found))
-
-
-def _locator(points: Floats, triangles: NDArray[np.int64]) -> Any:
-    """Locator of the triangles that a line meets."""
-    locator = _vtk("vtkCommonDataModel").vtkStaticCellLocator()
-    locator.SetDataSet(_poly_data(points, triangles))
-    locator.BuildLocator()
-    return locator
-
-
-def _poly_data(points: Floats, triangles: NDArray[np.int64]) -> Any:
-    core, model, support = _vtk("vtkCommonCore"), _vtk("vtkCommonDataModel"), _vtk("util.numpy_support")
-    data, nodes, cells = model.vtkPolyData(), core.vtkPoints(), model.vtkCellArray()
-    ends = np.arange(0, triangles.size + 1, 3)
-    nodes.SetData(support.numpy_to_vtk(points, deep=True))
-    cells.SetData(*(support.numpy_to_vtkIdTypeArray(part, deep=True) for part in (ends, triangles.ravel())))
-    data.SetPoints(nodes)
-    data.SetPolys(cells)
-    return data
-
-
-def _vtk(module: str) -> Any:
-    """A module of VTK, which comes with the kernel's usual wheel."""
-    try:
-        return import_module(f"vtkmodules.{module}")
-    except ModuleNotFoundError as problem:
-        raise GyroidError(f"distances from triangles need VTK (pip install vtk): {problem}") from None
 
 
 def surface_places(points: Floats, triangles: Integers, count: int) -> tuple[Floats, Floats, Floats]:

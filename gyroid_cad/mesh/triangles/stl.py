@@ -18,7 +18,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.triangles.corners import Corners, FaceGroup, face_groups, side_groups
 from gyroid_cad.mesh.triangles.triangulation import Triangulation
 
-__all__ = ["is_coarse", "require_near_origin", "write_stl"]
+__all__ = ["STL_HEADER", "is_coarse", "require_near_origin", "write_stl"]
 
 Singles = NDArray[np.float32]
 # Four single-precision numbers each, handed about as one.
@@ -37,7 +37,7 @@ _OVERLAPPING = np.dtype(
     }
 )
 _FIRST_TWELVE = np.dtype({"names": ["corner"], "formats": [_TWELVE_BYTES], "offsets": [0], "itemsize": 16})
-_HEADER = b"gyroid_cad, millimetres".ljust(80)
+STL_HEADER = b"gyroid_cad, millimetres".ljust(80)
 # The count of triangles has 32 bits.
 MOST_TRIANGLES = 2**32 - 1
 # Numbers of single precision may be so far apart where a part stands, in deviations of its triangles; and a deviation
@@ -78,7 +78,7 @@ def write_stl(
         raise ParameterError("output", str(path), f"at most {MOST_TRIANGLES:,} triangles in STL; these are {total:,}")
     report_progress(progress, stage, 0, total)
     with replacing(path) as temporary, temporary.open("wb") as file:
-        file.write(_HEADER + np.uint32(total).astype("<u4").tobytes())
+        file.write(STL_HEADER + np.uint32(total).astype("<u4").tobytes())
         written = flushed = 0
         for records in _records(triangulation):
             file.write(records.data)

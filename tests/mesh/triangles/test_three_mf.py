@@ -19,8 +19,8 @@ from gyroid_cad.errors import ExportError
 from gyroid_cad.fields.makers import linear
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
-from gyroid_cad.mesh.triangles.three_mf import write_3mf
 from gyroid_cad.mesh.triangles.triangulation import Triangulation, triangulated
+from gyroid_cad.mesh.triangles.writing import write_3mf
 from gyroid_cad.surface.fit import FitSettings
 
 COARSE = FitSettings(5)

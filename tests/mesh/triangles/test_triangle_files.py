@@ -89,7 +89,7 @@ def test_triangles_without_area_are_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("a.obj", b"", "ending in .stl or .3mf"),
+        ("a.dwg", b"", "ending in .stl, .3mf, .obj or .ply"),
         ("a.stl", b"solid of nothing", "with triangles of finite size in it"),
         ("a.stl", b"\xff\xfe not text", "a file of triangles"),
         ("a.stl", b"solid\nvertex 1 2\n", "a file of triangles"),

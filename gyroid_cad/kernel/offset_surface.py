@@ -1,0 +1,210 @@
+"""The offset of one face inwards: in closed form where its kind has one, else a spline fitted to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepTools import BRepTools
+from OCP.Geom import Geom_BSplineSurface, Geom_Circle, Geom_Curve, Geom_Line, Geom_OffsetSurface, Geom_Surface
+from OCP.Geom2d import Geom2d_Curve
+from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
+
+from gyroid_cad.common.arrays import unit
+from gyroid_cad.kernel.spline_fit import fitted_surface
+
+__all__ = ["FaceOffset", "between", "closed_form_curve", "curve_points", "derivatives", "plane_points"]
+
+Floats = NDArray[np.float64]
+
+# Of lengths of 1 mm, or in parts of larger ones.
+_SAME = 1e-9
+# How short one derivative is beside the other where a side of a face is a point, and how far off that place the
+# normal is taken, in parts of the face.
+_POLE, _BESIDE = 1e-7, 1e-6
+# By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
+_LEAST_STRETCH = 1e-4
+_SAMPLES, _STEP = 9, 1e-5
+
+
+class FaceOffset:
+    """The offset of a face inwards, which has the face's parameters.
+
+    Parameters
+    ----------
+    face : TopoDS_Face
+        Oriented out of its solid.
+    by : float
+        In mm.
+    tolerance : float
+        Of a fit, in mm.
+
+    Attributes
+    ----------
+    surface : Geom_Surface, optional
+        None where the face is bent so narrowly that nothing of its offset bounds a core.
+    outwards : float
+        1 if the face's parameters go round its outward normal anticlockwise, else -1.
+
+    Raises
+    ------
+    KernelError
+        If no spline comes near enough.
+    """
+
+    def __init__(self, face: TopoDS_Face, by: float, tolerance: float) -> None:
+        self.base = BRep_Tool.Surface_s(face)
+        self.outwards = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
+        self.by = by
+        self.bounds = np.array(BRepTools.UVBounds_s(face)).reshape(2, 2)
+        self.surface: Geom_Surface | None = None
+        if not self.bent_away():
+            self.surface = self._closed_form() or self._fitted(tolerance)
+
+    def normals(self, places: Floats) -> Floats:
+        """Unit normals out of the solid at parameters, shape (n, 2); shape (n, 3)."""
+        _, along_u, along_v = derivatives(self.base, places)
+        found = np.cross(along_u, along_v)
+        spans = np.ptp(self.bounds, axis=1)
+        lengths = np.stack([np.linalg.norm(some, axis=1) for some in (along_u, along_v)]) * spans[:, np.newaxis]
+        poles = lengths.min(axis=0) < _POLE * lengths.max(axis=0)
+        if poles.any():
+            # At a pole: the normal of what is next to it.
+            moved = places[poles] + _BESIDE * (self.bounds.mean(axis=1) - places[poles])
+            _, beside_u, beside_v = derivatives(self.base, moved)
+            found[poles] = np.cross(beside_u, beside_v)
+        return self.outwards * unit(found)
+
+    def tangents(self, curve: Geom2d_Curve, parameters: Floats) -> Floats:
+        """Unit tangents on the face of a curve in its parameter plane; shape (n, 3)."""
+        place, way = gp_Pnt2d(), gp_Vec2d()
+        places, ways = np.empty((len(parameters), 2)), np.empty((len(parameters), 2))
+        for index, parameter in enumerate(parameters.tolist()):
+            curve.D1(parameter, place, way)
+            places[index], ways[index] = (place.X(), place.Y()), (way.X(), way.Y())
+        _, along_u, along_v = derivatives(self.base, places)
+        return unit(ways[:, :1] * along_u + ways[:, 1:] * along_v)
+
+    def bent_away(self) -> bool:
+        """True where the face is bent more than the offset is wide, all over: then nothing of it bounds a core."""
+        places = self._grid(_SAMPLES)
+        step = _STEP * np.ptp(self.bounds, axis=1)
+        _, along_u, along_v = derivatives(self.base, places)
+        moved = [
+            (self.points(places + shift) - self.points(places - shift)) / (2 * step[way])
+            for way, shift in enumerate(np.diag(step))
+        ]
+        basis = np.stack([along_u, along_v], axis=-1)
+        stretch = np.linalg.pinv(basis) @ np.stack(moved, axis=-1)
+        return bool(np.all(np.linalg.eigvals(stretch).real.min(axis=1) < _LEAST_STRETCH))
+
+    def points(self, places: Floats) -> Floats:
+        """Points of the offset at parameters, shape (n, 2); shape (n, 3)."""
+        return derivatives(self.base, places)[0] - self.by * self.normals(places)
+
+    def _closed_form(self) -> Geom_Surface | None:
+        try:
+            surface = Geom_OffsetSurface(self.base, -self.by * self.outwards).Surface()
+        except Exception:
+            return None
+        if surface is None:
+            return None
+        places = self._grid(_SAMPLES)
+        off = np.linalg.norm(derivatives(surface, places)[0] - self.points(places), axis=1).max()
+        return surface if off < _SAME * max(1.0, float(np.abs(self.points(places)).max())) else None
+
+    def _fitted(self, tolerance: float) -> Geom_Surface | None:
+        def points(u: Floats, v: Floats) -> Floats:
+            grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+            return self.points(grid).reshape(len(u), len(v), 3)
+
+        breaks_u, breaks_v = (_breaks(self.base, way, *self.bounds[way].tolist()) for way in (0, 1))
+        return fitted_surface(points, breaks_u, breaks_v, tolerance)
+
+    def _grid(self, count: int) -> Floats:
+        """So many places along either side, none of them on a side, which may be a point; shape (n, 2)."""
+        u, v = (np.linspace(low, high, count + 2)[1:-1] for low, high in self.bounds)
+        return np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _breaks(surface: Geom_Surface, way: int, low: float, high: float) -> list[float]:
+    """Knots of a surface between two parameters along u or v, these among them."""
+    knots: list[float] = []
+    if isinstance(surface, Geom_BSplineSurface):
+        count = (surface.NbUKnots, surface.NbVKnots)[way]()
+        knot = (surface.UKnot, surface.VKnot)[way]
+        knots = [knot(index) for index in range(1, count + 1)]
+    span = high - low
+    return [low, *(value for value in knots if low + 1e-6 * span < value < high - 1e-6 * span), high]
+
+
+def curve_points(curve: Geom_Curve | BRepAdaptor_Curve, parameters: Floats) -> Floats:
+    """Points of a curve, shape (n, 3)."""
+    found = [curve.Value(parameter) for parameter in parameters.tolist()]
+    return np.array([(point.X(), point.Y(), point.Z()) for point in found])
+
+
+def plane_points(curve: Geom2d_Curve, parameters: Floats) -> Floats:
+    """Places on a curve in a parameter plane, shape (n, 2)."""
+    found = [curve.Value(parameter) for parameter in parameters.tolist()]
+    return np.array([(point.X(), point.Y()) for point in found])
+
+
+def derivatives(surface: Geom_Surface, places: Floats) -> tuple[Floats, Floats, Floats]:
+    """Points of a surface and its derivatives along u and v at parameters, shape (n, 2); shape (n, 3) each."""
+    point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+    found = np.empty((3, len(places), 3))
+    for index, (u, v) in enumerate(places.tolist()):
+        surface.D1(u, v, point, along_u, along_v)
+        found[0, index] = point.X(), point.Y(), point.Z()
+        found[1, index] = along_u.X(), along_u.Y(), along_u.Z()
+        found[2, index] = along_v.X(), along_v.Y(), along_v.Z()
+    return found[0], found[1], found[2]
+
+
+def closed_form_curve(
+    edge: TopoDS_Edge, points_at: Callable[[Floats], Floats], first: float, last: float
+) -> Geom_Curve | None:
+    """The line or the circle that the points of an edge's offset lie on, with its parameter, if they do."""
+    kind = BRepAdaptor_Curve(edge).GetType()
+    parameters = np.linspace(first, last, _SAMPLES)
+    points = points_at(parameters)
+    if kind == GeomAbs_Line:
+        way = (points[-1] - points[0]) / (last - first)
+        origin = points[0] - first * way
+        curve: Geom_Curve = Geom_Line(gp_Pnt(*origin.tolist()), gp_Dir(*way.tolist()))
+    elif kind == GeomAbs_Circle:
+        axis = BRepAdaptor_Curve(edge).Circle().Axis().Direction()
+        normal = np.array([axis.X(), axis.Y(), axis.Z()])
+        # Two radii are perpendicular to their tangents; the centre is where their planes meet the circle's.
+        tangents = [np.cross(normal, points[i + 1] - points[i - 1]) for i in (1, _SAMPLES - 2)]
+        across = [points[i + 1] - points[i - 1] for i in (1, _SAMPLES - 2)]
+        matrix = np.array([*across, normal])
+        if abs(np.linalg.det(matrix)) < _SAME * np.prod(np.linalg.norm(matrix, axis=1)) or not tangents:
+            return None
+        centre = np.linalg.solve(matrix, [across[0] @ points[1], across[1] @ points[-2], normal @ points[0]])
+        radial = points[0] - centre
+        start = np.cos(first) * radial - np.sin(first) * np.cross(normal, radial)
+        axes = gp_Ax2(gp_Pnt(*centre.tolist()), gp_Dir(*normal.tolist()), gp_Dir(*start.tolist()))
+        curve = Geom_Circle(axes, float(np.linalg.norm(radial)))
+    else:
+        return None
+    off = np.linalg.norm(curve_points(curve, parameters) - points, axis=1).max()
+    return curve if off < _SAME * max(1.0, float(np.abs(points).max())) else None
+
+
+def between(one: Floats, other: Floats, across: Floats) -> Floats:
+    """Unit vectors on great circles from some to others, each shape (n, 3), so far across; shape (k, n, 3)."""
+    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
+    sines = np.sin(angles)
+    flat = sines < _SAME
+    safe = np.where(flat, 1.0, sines)
+    a = np.where(flat, 1 - across[:, np.newaxis], np.sin((1 - across)[:, np.newaxis] * angles) / safe)
+    b = np.where(flat, across[:, np.newaxis], np.sin(across[:, np.newaxis] * angles) / safe)
+    return np.asarray(a[..., np.newaxis] * one + b[..., np.newaxis] * other)

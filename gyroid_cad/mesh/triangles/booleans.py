@@ -1,0 +1,185 @@
+"""Bodies bounded by triangles, united, intersected and subtracted (manifold3d).
+
+The library's booleans give a closed, oriented manifold whatever they are given that is one, and compare coordinates
+symbolically, without a tolerance: E. Lalish, Manifold, https://github.com/elalish/manifold, after J. M. Smith and
+N. A. Dodgson, A topologically robust algorithm for Boolean operations on polyhedral shapes, CAD 39 (2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from manifold3d import Error, Manifold, Mesh64, OpType
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot
+
+__all__ = ["Body", "body_of", "united"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_ASKEW = np.array([0.5257, 0.3161, 0.7898])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """Space inside closed triangles, in one piece or several.
+
+    Attributes
+    ----------
+    manifold : Manifold
+        The library's own.
+
+    Examples
+    --------
+    >>> cube = Body(Manifold.cube((2, 2, 2)))
+    >>> corner = cube.moved(np.ones(3))
+    >>> (cube & corner).volume, (cube - corner).volume, (cube | corner).volume
+    (1.0, 7.0, 15.0)
+    """
+
+    manifold: Manifold
+
+    def __and__(self, other: Body) -> Body:
+        return Body(self.manifold ^ other.manifold)
+
+    def __or__(self, other: Body) -> Body:
+        return Body(self.manifold + other.manifold)
+
+    def __sub__(self, other: Body) -> Body:
+        return Body(self.manifold - other.manifold)
+
+    @property
+    def volume(self) -> float:
+        """In mm3."""
+        return float(self.manifold.volume())
+
+    @property
+    def area(self) -> float:
+        """In mm2."""
+        return float(self.manifold.surface_area())
+
+    @property
+    def triangle_count(self) -> int:
+        return int(self.manifold.num_tri())
+
+    @property
+    def empty(self) -> bool:
+        return bool(self.manifold.is_empty())
+
+    @property
+    def bounds(self) -> Floats:
+        """Lowest and highest corner of the box round it, in mm; shape (2, 3)."""
+        return np.array(self.manifold.bounding_box()).reshape(2, 3)
+
+    @property
+    def centre(self) -> Floats:
+        """Centre of mass, in mm, by the tetrahedra from the origin to the triangles; shape (3,)."""
+        vertices, triangles = self.triangles()
+        a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+        weights = dot(a, np.cross(b, c))
+        return np.asarray(((a + b + c) * weights[:, np.newaxis]).sum(axis=0) / (4 * weights.sum()))
+
+    def pieces(self) -> list[Body]:
+        """Bodies that no edge joins, each with the voids in it, the largest first.
+
+        >>> cube = Body(Manifold.cube((2, 2, 2)))
+        >>> hollow = cube - Body(Manifold.cube((1, 1, 1))).moved(np.full(3, 0.5))
+        >>> [(round(piece.volume, 9), piece.void_count) for piece in (hollow | cube.moved(np.full(3, 5.0))).pieces()]
+        [(8.0, 0), (7.0, 1)]
+        """
+        solid, voids = self._shells()
+        if len(solid) == 1:
+            return [self]
+        with_voids = {_smallest_round(void, solid) for void in voids}
+        # What the library decomposes are shells: one that goes round voids is intersected with the whole again.
+        found = [Body(self.manifold ^ shell if k in with_voids else shell) for k, shell in enumerate(solid)]
+        return sorted(found, key=lambda piece: -piece.volume)
+
+    @property
+    def void_count(self) -> int:
+        """Count of the voids that no way leads out of."""
+        return len(self._shells()[1])
+
+    def voids(self) -> list[Body]:
+        """Voids that no way leads out of, as bodies of their own, the largest first."""
+        solid, voids = self._shells()
+        if not voids:
+            return []
+        filled = Manifold.batch_boolean(solid, OpType.Add)
+        return Body(filled - self.manifold).pieces()
+
+    def _shells(self) -> tuple[list[Manifold], list[Manifold]]:
+        """Shells that bound solid from outside, and those that bound voids in it."""
+        shells = self.manifold.decompose()
+        outward = [shell.volume() > 0 for shell in shells]
+        solid, voids = (
+            [shell for shell, out in zip(shells, outward, strict=True) if out == side] for side in (True, False)
+        )
+        return solid, voids
+
+    def triangles(self) -> tuple[Floats, Integers]:
+        """Vertices in mm, shape (vertices, 3), and triangles as their numbers, shape (triangles, 3), outwards."""
+        mesh = self.manifold.to_mesh64()
+        vertices = np.array(mesh.vert_properties[:, :3])
+        return vertices, np.asarray(mesh.tri_verts, dtype=np.int64)
+
+    def simplified(self, tolerance: float) -> Body:
+        """The body with fewer triangles, no vertex moved further than a tolerance in mm."""
+        return Body(self.manifold.simplify(tolerance))
+
+    def moved(self, shift: Floats) -> Body:
+        """The body, translated by a vector in mm."""
+        return Body(self.manifold.translate(np.asarray(shift, dtype=float).tolist()))
+
+
+def body_of(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> Body | None:
+    """The body that triangles bound; None if they are not closed, not oriented, or no manifold.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+
+    Examples
+    --------
+    >>> vertices, triangles = Body(Manifold.cube((1, 1, 1))).triangles()
+    >>> body_of(vertices, triangles).volume, body_of(vertices, triangles[1:])
+    (1.0, None)
+    """
+    points = np.array(vertices, dtype=np.float64, order="C")
+    manifold = Manifold(Mesh64(points, np.array(triangles, dtype=np.uint64, order="C")))
+    return Body(manifold) if manifold.status() == Error.NoError else None
+
+
+def united(bodies: Iterable[Body]) -> Body:
+    """All bodies together.
+
+    Examples
+    --------
+    >>> cube = Body(Manifold.cube((2, 2, 2)))
+    >>> united([cube, cube.moved(np.ones(3)), cube.moved(np.full(3, 5.0))]).volume
+    23.0
+    """
+    return Body(Manifold.batch_boolean([body.manifold for body in bodies], OpType.Add))
+
+
+def _smallest_round(void: Manifold, shells: Sequence[Manifold]) -> int:
+    """Number of the smallest shell that goes round a void, by how often a ray from it crosses each."""
+    start = np.array(void.to_mesh64().vert_properties[0, :3])
+    low, high = np.array(void.bounding_box()).reshape(2, 3)
+    found, least = 0, np.inf
+    for index, shell in enumerate(shells):
+        box = np.array(shell.bounding_box()).reshape(2, 3)
+        if np.any(box[0] > low) or np.any(box[1] < high) or shell.volume() >= least:
+            continue
+        # A direction that no flat face of a part is likely to lie along.
+        beyond = start + np.linalg.norm(box[1] - box[0]) * 1.5 * _ASKEW
+        if len(shell.ray_cast(start.tolist(), beyond.tolist())) % 2:
+            found, least = index, shell.volume()
+    return found

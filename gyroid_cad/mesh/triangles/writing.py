@@ -1,0 +1,246 @@
+"""Triangles as files that hold one mesh: STL, 3MF, OBJ and PLY, each read back before it takes its name."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from uuid import NAMESPACE_OID, uuid5
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.files import replacing
+from gyroid_cad.common.formats import OBJ, PLY, STL, THREE_MF, TRIANGLE_FORMATS, require_format
+from gyroid_cad.errors import ExportError
+from gyroid_cad.mesh.triangles.files import STL_RECORD, numbered_corners, read_triangles
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
+from gyroid_cad.mesh.triangles.stl import STL_HEADER
+
+__all__ = ["storable_triangles", "write_3mf", "write_triangles"]
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Integers = NDArray[np.int64]
+
+# Of coordinates, so that single precision survives being written in decimals.
+_DECIMALS = 9
+# How often vertices that single precision makes one are moved apart, each time by twice as many of its steps.
+_TRIES = 8
+
+
+def storable_triangles(vertices: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+    """Triangles that stay closed when their corners are rounded to single precision and numbered by coordinates alone.
+
+    Corners that become one are one, and triangles between them vanish; where two that do not belong together would
+    meet, they are moved apart by some steps of single precision, each into its own side.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Closed.
+
+    Returns
+    -------
+    vertices : ndarray, shape (fewer, 3)
+        Numbers that single precision has.
+    triangles : ndarray of int, shape (fewer, 3)
+
+    Raises
+    ------
+    ExportError
+        If they do not stay closed.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> len(storable_triangles(corners, sides)[1])
+    4
+    """
+    rounded = vertices.astype(np.float32)
+    for attempt in range(_TRIES):
+        places, numbers, _ = numbered_corners(rounded[triangles])
+        if not unmatched_edges(numbers):
+            return places.astype(np.float64), numbers
+        rounded = _parted(vertices, triangles, rounded, 2.0**attempt)
+    raise ExportError(
+        "nothing was written: its triangles do not stay closed in single precision; try another deviation"
+    )
+
+
+def _parted(vertices: Floats, triangles: Integers, rounded: Singles, steps: float) -> Singles:
+    """Corners that became one moved a few steps of single precision against the normals of their own triangles."""
+    _, which, count = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
+    together = np.flatnonzero(count[which.ravel()] > 1)
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    across = np.cross(b - a, c - a)
+    normals = np.stack(
+        [np.bincount(triangles.ravel(), np.repeat(across[:, k], 3), len(vertices)) for k in range(3)], axis=1
+    )[together]
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    step = steps * float(np.spacing(np.abs(rounded).max()))
+    parted = rounded.copy()
+    parted[together] = vertices[together] - step * normals
+    return parted
+
+
+def write_triangles(
+    vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: str | os.PathLike[str]
+) -> None:
+    """Write one mesh in millimetres as STL, 3MF, OBJ or PLY, as the path's ending says.
+
+    The file is read back, its corners numbered by their coordinates as any reader does: only if every edge is then
+    shared by two triangles, once each way, does it take its name.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+    path : path-like
+
+    Raises
+    ------
+    ExportError
+    """
+    form = require_format("output", path, TRIANGLE_FORMATS)
+    if form is THREE_MF:
+        # Its own library refuses what is not closed.
+        write_3mf(np.asarray(vertices, dtype=np.float32), np.asarray(triangles, dtype=np.int32), path)
+        return
+    writer = {STL: _write_stl, OBJ: _write_obj, PLY: _write_ply}[form]
+    with replacing(path) as temporary:
+        writer(np.asarray(vertices), np.asarray(triangles), temporary)
+        _, numbers = read_triangles(temporary, form)
+        if open_edges := unmatched_edges(numbers):
+            raise ExportError(
+                f"{path} was not written: read back it has {open_edges} edges that two triangles do not share"
+            )
+
+
+def _write_stl(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path) -> None:
+    corners = np.asarray(vertices, dtype=np.float32)[triangles]
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float32).tiny)
+    records = np.zeros(len(triangles), STL_RECORD)
+    records["normal"], records["corners"] = normals, corners
+    with path.open("wb") as file:
+        file.write(STL_HEADER + np.uint32(len(triangles)).astype("<u4").tobytes())
+        file.write(records.data)
+
+
+def _write_obj(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path) -> None:
+    """Text, corners counted from 1 (Wavefront, Object Files, Advanced Visualizer manual, appendix B1)."""
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write("# gyroid_cad, millimetres\n")
+        # As many digits as give each number back.
+        file.writelines(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
+        file.writelines(f"f {a} {b} {c}\n" for a, b, c in (triangles + 1).tolist())
+
+
+def _write_ply(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path) -> None:
+    """Binary PLY, corners in double precision (G. Turk, The PLY Polygon File Format, 1994)."""
+    faces = np.zeros(len(triangles), np.dtype([("count", "u1"), ("corners", "<i4", 3)]))
+    faces["count"], faces["corners"] = 3, triangles
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment gyroid_cad, millimetres",
+        f"element vertex {len(vertices)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {len(triangles)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    with path.open("wb") as file:
+        file.write("\n".join(header).encode("ascii"))
+        file.write(np.ascontiguousarray(vertices, dtype="<f8").data)
+        file.write(faces.data)
+
+
+def write_3mf(vertices: NDArray[np.float32], triangles: NDArray[np.int32], path: str | os.PathLike[str]) -> None:
+    """Write one mesh as 3MF (core specification 1.3), in millimetres.
+
+    The whole mesh, the library's copy of it and its text are in memory at once, about 350 bytes a triangle: for
+    lattices of many millions of triangles STL, which is streamed, is the better file.
+
+    Parameters
+    ----------
+    vertices : ndarray of float32, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int32, shape (triangles, 3)
+        Numbers of vertices, counterclockwise seen from outside.
+    path : path-like
+
+    Raises
+    ------
+    ExportError
+        If the library finds the mesh not closed or not oriented, or the file could not be written.
+    """
+    import lib3mf
+
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    model.SetUnit(lib3mf.ModelUnit.MilliMeter)
+    mesh = model.AddMeshObject()
+    mesh.SetName("gyroid_cad")
+    places = np.array(vertices, dtype="<f4", order="C")
+    numbers = np.array(triangles, dtype="<u4", order="C")
+    corners = (lib3mf.Position * len(vertices)).from_buffer(places)
+    facets = (lib3mf.Triangle * len(triangles)).from_buffer(numbers)
+    try:
+        mesh.SetGeometry(corners, facets)
+        if not mesh.IsManifoldAndOriented():
+            raise ExportError(f"{path} was not written: its triangles are not closed and oriented")
+        item = model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
+        # The library draws lots for them; so the same mesh makes the same file.
+        content = sha256(places.tobytes())
+        content.update(numbers.tobytes())
+        for name, set_identity in (("object", mesh.SetUUID), ("item", item.SetUUID), ("build", model.SetBuildUUID)):
+            set_identity(str(uuid5(NAMESPACE_OID, f"{name} {content.hexdigest()}")))
+        writer = model.QueryWriter("3mf")
+        writer.SetDecimalPrecision(_DECIMALS)
+        package = _written(writer)
+    except lib3mf.ELib3MFException as problem:
+        raise ExportError(f"{path} was not written: lib3mf says {problem}") from problem
+    with replacing(path) as temporary:
+        temporary.write_bytes(package)
+
+
+def _written(writer: Any) -> memoryview:
+    """Bytes that a writer of lib3mf writes: into memory, for to a file on a full disk it ends the whole process."""
+    import lib3mf
+
+    package = BytesIO()
+    problems: list[BaseException] = []
+
+    @contextmanager
+    def told_later() -> Iterator[None]:
+        # Nothing passes through the library: an interrupt, or memory that gives out, would be lost in it.
+        try:
+            yield
+        except BaseException as problem:
+            problems.append(problem)
+
+    def write(address: int, count: int, _: object) -> None:
+        with told_later():
+            package.write(ctypes.string_at(address, count))
+
+    def seek(position: int, _: object) -> None:
+        with told_later():
+            package.seek(position)
+
+    writer.WriteToCallback(lib3mf.WriteCallback(write), lib3mf.SeekCallback(seek), None)
+    if problems:
+        raise problems[0]
+    return package.getbuffer()

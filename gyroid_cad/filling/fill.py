@@ -306,7 +306,8 @@ def fill(
         with naming_triangles(kind, name if len(parts) > 1 else ""):
             hollow = _hollow(whole, shell, faces, core)
             inner = whole if hollow is None else hollow.core
-            filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
+            infill = functools.partial(infill_in, inner)
+            filling = Filling(whole, hollow, regions, infill, size, told, endless=lattice is None)
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
         domains, voids = without_specks(domains, filling)

@@ -13,15 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
-<<<<<<< HEAD
-from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.errors import KernelError
-=======
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.filling.extent import PartExtent
->>>>>>> main
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
@@ -99,6 +93,8 @@ class Filling:
     progress : callable, optional
     seconds : dict
         By stage.
+    endless : bool
+        Whether the lattice goes on beyond the part: the side walls of one that ends are left to the kernel.
     """
 
     part: Part
@@ -108,6 +104,7 @@ class Filling:
     cell_size: float
     progress: Progress | None
     seconds: dict[str, float] = field(default_factory=dict)
+    endless: bool = True
 
     @property
     def core(self) -> Part:
@@ -134,17 +131,13 @@ class Filling:
         attempts: list[tuple[Road, Point, int | None]] = [
             ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
-        attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
-        if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
-            attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
+        if self.endless:
+            attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
+            if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
+                attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
-<<<<<<< HEAD
-            partial(self._filled, frame, np.array(phase) * self.cell_size, points, road, processes)
-            for road, phase, processes in attempts
-=======
-            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
-            for number, (phase, by_sections, processes) in enumerate(attempts, 1)
->>>>>>> main
+            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, road, processes)
+            for number, (road, phase, processes) in enumerate(attempts, 1)
         )
 
     def _attempt(self, number: int, *given: Any) -> Outcome:

@@ -73,8 +73,7 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
     Parameters
     ----------
     road : {"sections", "crossings", "booleans"}
-        Sections are of a box alone. A block's own side walls are none of the faces that the first two cut: it goes to
-        the kernel.
+        Sections are of a box alone; the first two of endless lattices, for they cut no side walls.
     job : Job
     infill : Infill
     processes : int, optional
@@ -84,9 +83,9 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
     ------
     KernelError
     """
-    if road == "sections" and infill.endless:
+    if road == "sections":
         return _by_sections(job, infill)
-    if road == "crossings" and infill.endless:
+    if road == "crossings":
         try:
             return _by_crossings(job, infill)
         except np.linalg.LinAlgError as singular:

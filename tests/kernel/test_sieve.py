@@ -95,6 +95,14 @@ def test_offsets_of_planes_cylinders_spheres_and_tori_stay_of_their_kind() -> No
     assert kinds(core_of_pieces(solid_of(bd.Torus(10, 4)), 1.0)) == {"GeomAbs_Torus"}
 
 
+def test_edges_that_point_inwards_become_cylinders_and_tori_and_corners_balls() -> None:
+    assert kinds(core_of_pieces(solid_of(notched()), 1.0)) == {f"GeomAbs_{k}" for k in ("Plane", "Cylinder", "Sphere")}
+    stepped = bd.Cylinder(8, 6) + bd.Pos(0, 0, 6) * bd.Cylinder(4, 6)
+    core = core_of_pieces(solid_of(stepped), 1.0)
+    assert kinds(core) == {f"GeomAbs_{k}" for k in ("Plane", "Cylinder", "Torus")}
+    assert Depths(solid_of(stepped), []).confirm(core, 1.0)
+
+
 def largest_error(solid: TopoDS_Solid, core: list[TopoDS_Solid], skin: float) -> float:
     """Of the depth of a core's faces, in skins."""
     depths = FaceDistances(parts_of(solid, TopAbs_FACE))

@@ -23,7 +23,7 @@ from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.infill import described_infill, require_cover
 from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
-from gyroid_cad.filling.triangle_part import naming_triangles
+from gyroid_cad.filling.triangle_part import naming_triangles, require_brep
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
@@ -194,6 +194,7 @@ def fill(
     partial: bool = False,
     route: Route = "brep",
     deviation: float | None = None,
+    repair: bool = False,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -250,6 +251,8 @@ def fill(
         file, and what comes out is no :class:`Filled` but :class:`~gyroid_cad.FilledTriangles`.
     deviation : float, optional
         Of the triangles of that route, in mm; of the other, :meth:`Filled.write` takes it.
+    repair : bool
+        Close a part of triangles that is open, at that route; the report says what was done.
 
     Returns
     -------
@@ -287,9 +290,8 @@ def fill(
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
         job = TriangleJob(kind, size, regions, infill_in, *given)
         # Not of the class, but with all of it that needs no B-rep.
-        return job.filled(part, solids, Shell(shell, openings, core))  # type: ignore[return-value]
-    if deviation is not None:
-        raise ParameterError("deviation", deviation, "none at route brep, whose solids write(deviation=...) meshes")
+        return job.filled(part, solids, repair, Shell(shell, openings, core))  # type: ignore[return-value]
+    require_brep(deviation=deviation, repair=repair)
     parts, remarks = parts_of(part, solids)
     if core is not None and len(parts) > 1:
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")

@@ -344,7 +344,9 @@ def answered(arguments: list[str], given: Given, folder: Path, captured: Capture
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         main(arguments)
-    said = "".join(captured.readouterr())
+    out, err = captured.readouterr()
+    # JSON is read from standard output alone.
+    said = out if "--json" in arguments or given.get("json") else out + err
     file = folder / given.get("file", "made.brep")
     shape = read_brep(file) if file.exists() and file.suffix == ".brep" else None
     return Made(shape, file, said, report=json.loads(said) if "--json" in arguments else {})

@@ -5,19 +5,24 @@ from __future__ import annotations
 import errno
 import os
 import sys
+import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any
+
+from gyroid_cad.common.progress import is_forecast
 
 if TYPE_CHECKING:
     from gyroid_cad.cli.installation import Diagnosis
     from gyroid_cad.common.tables import Rows
     from gyroid_cad.printing.verdict import PrintCheck
 
-__all__ = ["print_check_table", "print_doctor", "print_report", "print_table", "shown_progress"]
+__all__ = ["SILENT_SECONDS", "print_check_table", "print_doctor", "print_report", "print_table", "shown_progress"]
 
 Progress = Callable[[str, int, int], None]
 
+# Of a command whose stages are printed: what takes no longer is told by its result alone.
+SILENT_SECONDS = 5.0
 # Columns of a pipe, which has none.
 _UNWRAPPED = 100_000
 
@@ -48,13 +53,42 @@ def print_doctor(diagnosis: Diagnosis) -> None:
     print_table(None, [*rows, ("verdict", "ok" if diagnosis.ok else "failed", verdict)])
 
 
-def shown_progress(shown: bool) -> AbstractContextManager[Progress | None]:
-    """A progress display on the terminal while the context lasts, or none."""
+def shown_progress(shown: bool, lines: bool = False) -> AbstractContextManager[Progress | None]:
+    """A progress display on the terminal while the context lasts, or none.
+
+    Parameters
+    ----------
+    shown : bool
+    lines : bool
+        Where the error stream is no terminal, to print a line there for each stage of what takes long.
+    """
     if not shown:
         return nullcontext(None)
+    if lines and not sys.stderr.isatty():
+        return nullcontext(_line_progress(time.perf_counter()))
     from gyroid_cad.cli.bars import terminal_progress
 
     return terminal_progress()
+
+
+def _line_progress(start: float) -> Progress:
+    """A function that prints each stage once, with the seconds since the start, for logs.
+
+    Nothing is printed of what ends, or is refused, within :data:`SILENT_SECONDS`.
+    """
+    said: set[str] = set()
+    held: list[str] = []
+
+    def update(stage: str, done: int, total: int) -> None:
+        seconds = time.perf_counter() - start
+        if stage not in said:
+            said.add(stage)
+            held.append(f"{seconds:7.1f} s  {stage}{f', {total} s' if is_forecast(stage) else ''}")
+        if seconds >= SILENT_SECONDS and held:
+            print(*held, sep="\n", file=sys.stderr, flush=True)
+            held.clear()
+
+    return update
 
 
 def print_table(header: tuple[str, ...] | None, rows: Sequence[tuple[str, ...]]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -186,7 +185,7 @@ def fill_command(
     if settings["route"] == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         settings["deviation"], written = given["deviation"], {}
-    with shown_progress(sys.stderr.isatty() and not quiet) as progress:
+    with shown_progress(not quiet, lines=True) as progress:
         try:
             filled = fill(part, progress=progress, **settings)
         except KernelError as failed:

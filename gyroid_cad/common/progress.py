@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-__all__ = ["Progress", "Timed", "named_progress", "report_progress", "timed"]
+__all__ = ["Progress", "Timed", "is_forecast", "named_progress", "report_progress", "timed"]
 
 Progress = Callable[[str, int, int], None]
+# What a stage begins with that tells what all of it takes: its total is of seconds.
+_FORECAST = "about "
 Timed = Callable[[str], AbstractContextManager[None]]
 
 
@@ -26,6 +28,15 @@ def report_progress(progress: Progress | None, stage: str, done: int, total: int
     """Tell how far a stage has come, if anyone listens."""
     if progress is not None:
         progress(stage, done, total)
+
+
+def is_forecast(stage: str) -> bool:
+    """Tell whether a stage is none, but what all of them are expected to take; its total then is that, in seconds.
+
+    >>> is_forecast("solid 1 of 2: about 300 crossings"), is_forecast("cover")
+    (True, False)
+    """
+    return stage.rpartition(": ")[2].startswith(_FORECAST)
 
 
 def named_progress(progress: Progress | None, name: str) -> Progress | None:

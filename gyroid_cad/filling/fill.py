@@ -14,16 +14,17 @@ from numpy.typing import NDArray
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import ROUTES, Kind, Route, Schema, SurfaceName
+from gyroid_cad.common.choices import Kind, Route, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
-from gyroid_cad.common.progress import Progress, named_progress, timed
+from gyroid_cad.common.progress import Progress, named_progress, report_progress, timed
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.distance_skin import Shell
-from gyroid_cad.filling.infill import described_infill, require_cover
-from gyroid_cad.filling.part import Filling, Outcome, part_of, parts_of, without_islands, without_specks
+from gyroid_cad.filling.forecast import require_cover
+from gyroid_cad.filling.infill import described_infill
+from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
-from gyroid_cad.filling.triangle_part import naming_triangles, require_brep
+from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
@@ -280,9 +281,8 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    if route not in ROUTES:
-        raise ParameterError("route", route, " or ".join(ROUTES))
-    regions, size, settings, infill_in = described_infill(
+    require_route(route, deviation=deviation, repair=repair)
+    regions, size, settings, foreseen, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
     if route == TRIANGLES:
@@ -291,8 +291,9 @@ def fill(
         job = TriangleJob(kind, size, regions, infill_in, *given)
         # Not of the class, but with all of it that needs no B-rep.
         return job.filled(part, solids, repair, Shell(shell, openings, core))  # type: ignore[return-value]
-    require_brep(deviation=deviation, repair=repair)
-    parts, remarks = parts_of(part, solids)
+    report_progress(progress, "read", 0, 1)
+    parts, remarks = bodies_of(part, solids)
+    report_progress(progress, "read", 1, 1)
     if core is not None and len(parts) > 1:
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
@@ -300,8 +301,8 @@ def fill(
     made, islands = [], Islands()
     for (name, whole), faces in zip(parts, _opened(parts, openings), strict=True):
         told = progress if len(parts) == 1 else named_progress(progress, name)
-        if lattice is None:
-            require_cover(whole.low, whole.high, size, settings.control_points)
+        forecast = foreseen(whole)
+        report_progress(told, str(forecast), 0, round(forecast.seconds))
         with naming_triangles(kind, name if len(parts) > 1 else ""):
             hollow = _hollow(whole, shell, faces, core)
             inner = whole if hollow is None else hollow.core

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial as partial_of
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind
-from gyroid_cad.common.memory import require_room
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
 from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
+from gyroid_cad.filling.forecast import Forecast, forecast_of
 from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -40,7 +41,7 @@ from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
 from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_cover"]
+__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_thicker"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -49,8 +50,6 @@ Booleans = NDArray[np.bool_]
 _BLOCK_SAMPLES = 13
 # Places of a part that tell what of it a block covers; and how often the block is cut back where its wall would fold.
 _COVER_POINTS, _MOST_CUTS = 2000, 20
-# Peak memory of filling and writing, for each cell of the box round a part, as measured, rounded up.
-_BYTES_PER_CELL = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,6 +133,12 @@ class Infill:
         ]
 
 
+class Foreseen(Protocol):
+    """Tells what filling a part takes, and refuses one that memory would not hold, or that is thinner than the wall."""
+
+    def __call__(self, part: Part) -> Forecast: ...
+
+
 class InfillIn(Protocol):
     """Gives the lattice for a part and a frame, each stage timed, with a uniform wall of so many mm at least."""
 
@@ -150,8 +155,8 @@ def described_infill(
     lattice: Lattice | None,
     surface: MinimalSurface,
     partial: bool = False,
-) -> tuple[tuple[Region, ...], float, FitSettings, InfillIn]:
-    """The regions wanted, the cell size, the fit, and how the lattice is to be had for a part and a frame.
+) -> tuple[tuple[Region, ...], float, FitSettings, Foreseen, InfillIn]:
+    """The regions wanted, the cell size, the fit, what a part would take, and how the lattice is to be had for one.
 
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
@@ -167,7 +172,10 @@ def described_infill(
         def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
             return block_infill(lattice, part, frame, timed, partial)
 
-        return regions.regions, lattice.cell_size, fit, block
+        uniform = lattice.wall_thickness if lattice.uniform else 0.0
+        own = lattice.cell_size, uniform, lattice.thickness, lattice.density
+        foreseen = partial_of(_foreseen, lattice.grading().cells_alike, lattice.fit.control_points, *own)
+        return regions.regions, lattice.cell_size, fit, foreseen, block
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
@@ -176,17 +184,55 @@ def described_infill(
 
     def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
         made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
-        smallest = float(np.min(part.high - part.low))
-        if smallest <= made.max_thickness:
-            name, given = ("thickness", thickness) if density is None else ("density", density)
-            raise ParameterError(
-                name,
-                given,
-                f"a wall below the part's smallest extent, {smallest:.6g} mm; it would be {made.max_thickness:.6g} mm",
-            )
+        require_thicker(part, made.max_thickness, thickness, density)
         return made
 
-    return wanted.regions, size, settings, endless
+    uniform = wanted.thickness if isinstance(wanted.thickness, float) else 0.0
+    foreseen = partial_of(_foreseen, True, settings.control_points, size, uniform, thickness, density)
+    return wanted.regions, size, settings, foreseen, endless
+
+
+def _foreseen(
+    without_end: bool,
+    control_points: int,
+    cell_size: float,
+    wall: float,
+    thickness: FieldLike | None,
+    density: FieldLike | None,
+    part: Part,
+) -> Forecast:
+    forecast = forecast_of(part, cell_size, control_points)
+    if without_end:
+        forecast.require_memory(cell_size)
+    require_thicker(part, wall, thickness, density)
+    return forecast
+
+
+def require_thicker(
+    part: Part | BoundedExtent, wall: float, thickness: FieldLike | None, density: FieldLike | None
+) -> None:
+    """Check that a part is somewhere thicker than the wall that is to fill it.
+
+    Parameters
+    ----------
+    part : Part or BoundedExtent
+        Of the latter the box is looked at.
+    wall : float
+        Whole wall where it is thickest, in mm; 0 where that is not known yet.
+    thickness, density : number or field, optional
+        As the user gave it.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not wall:
+        return
+    thickest = part.thickest(wall) if isinstance(part, Part) else float(np.min(part.high - part.low))
+    if thickest <= wall:
+        name, given = ("thickness", thickness) if density is None else ("density", density)
+        accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
+        raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def endless_infill(
@@ -236,32 +282,6 @@ def endless_infill(
     if refit is not None:
         min_thickness, max_thickness = min(min_thickness, refit.min_thickness), max(max_thickness, refit.max_thickness)
     return Infill(frame, grading, complex, wall.moved(frame.rotation, frame.origin), min_thickness, max_thickness, True)
-
-
-def require_cover(low: Floats, high: Floats, cell_size: float, control_points: int) -> None:
-    """Check that there is memory for the cells that cover a part, before any of them is made.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (3,)
-        Corners of the box round the part, in mm.
-    cell_size : float
-        In mm.
-    control_points : int
-        Of a patch, along a side.
-
-    Raises
-    ------
-    ParameterError
-        Saying how many cells that would be, and which size would do.
-    """
-    count = float(np.prod(np.maximum((high - low) / cell_size, 1)))
-    each = _BYTES_PER_CELL * max(1.0, (control_points / 10) ** 2)
-
-    def accepted(left: int) -> str:
-        return f"at least about {cell_size * (count * each / max(left, each)) ** (1 / 3):.3g} mm for this part"
-
-    require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
 
 
 def block_infill(

@@ -37,8 +37,8 @@ __all__ = [
     "Filling",
     "Made",
     "Outcome",
+    "bodies_of",
     "part_of",
-    "parts_of",
     "shapes_of",
     "solid_names",
     "without_islands",
@@ -144,9 +144,17 @@ class Filling:
             # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
             attempts = [(phase, True, None) for phase in PERTURBATIONS] + attempts
         return first_success(
-            partial(self._filled, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
-            for phase, by_sections, processes in attempts
+            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
+            for number, (phase, by_sections, processes) in enumerate(attempts, 1)
         )
+
+    def _attempt(self, number: int, *given: Any) -> Outcome:
+        """Fill, and announce it where it fails: another attempt takes as long again."""
+        try:
+            return self._filled(*given)
+        except KernelError as failed:
+            report_progress(self.progress, f"attempt {number} failed, the next one follows: {failed}", 1, 1)
+            raise
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
@@ -320,7 +328,7 @@ def _without(made: Made, shells: Sequence[KernelShape]) -> Made:
     return Made(without_shells(made.shape, shells), made.volume + volume, made.area - area)
 
 
-def parts_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
+def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[str, Part]], list[str]]:
     """The closed, valid solids of whatever a user gives as a part, each by itself; those that overlap are united.
 
     Parameters
@@ -363,7 +371,7 @@ def solid_names(solids: Sequence[str | int]) -> list[str | int]:
 
 def part_of(given: Any) -> Part:
     """The same as one part."""
-    parts, _ = parts_of(given)
+    parts, _ = bodies_of(given)
     return parts[0][1] if len(parts) == 1 else require_part(compound_of(part.shape for _, part in parts))
 
 

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from gyroid_cad.common.choices import Kind
+from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.part import shapes_of, solid_names
 from gyroid_cad.filling.wanted import SURFACE
@@ -21,17 +23,19 @@ from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.kernel.part import face_numbers, points_within, spread_points
 from gyroid_cad.kernel.repair import chosen_solids
 from gyroid_cad.kernel.stl import solid_triangles
-from gyroid_cad.mesh.triangles.booleans import Body, united
+from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.repair import Hole, holes_of, mended, sound_body
+from gyroid_cad.mesh.triangles.measures import Hole, holes_of, open_edges
 
-__all__ = ["TrianglePart", "is_triangles", "naming_triangles", "require_brep", "triangle_part"]
+__all__ = ["TrianglePart", "is_triangles", "mended", "naming_triangles", "require_route", "sound_body", "triangle_part"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
+# Corners nearer to each other are one, in parts of the part's size: above rounding in text of five digits.
+_WELDED = 1e-5
 # Of what several solids hold together: less in common may be rounding, where they touch.
 _SHARED = 1e-6
 # What is expected at the route of exact solids, of what it has no use for.
@@ -215,13 +219,134 @@ def _said(holes: Sequence[Hole]) -> str:
     )
 
 
-def require_brep(**given: Any) -> None:
-    """Refuse what is for the route of triangles alone, if it is given.
+def require_route(route: Route, **given: Any) -> None:
+    """Check that there is such a route, and at that of exact solids that nothing is given which triangles alone need.
 
     Raises
     ------
     ParameterError
     """
+    if route not in ROUTES:
+        raise ParameterError("route", route, " or ".join(ROUTES))
     for name, value in given.items():
-        if value not in (None, False):
+        if route == ROUTES[0] and value not in (None, False):
             raise ParameterError(name, value, _AT_BREP[name])
+
+
+def sound_body(vertices: Floats, triangles: Integers) -> tuple[Body | None, tuple[str, ...]]:
+    """The body that closed triangles bound, and what was done to make it one; None if they are open.
+
+    Edges that four triangles share are taken for two that lie on one another; a body that is inside out is turned;
+    shells that overlap are united.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> sound_body(corners, sides[:, ::-1])[1]
+    ('its triangles are inside out: turned',)
+    """
+    body = body_of(vertices, triangles) or body_of(*_parted_edges(vertices, triangles))
+    if body is None or body.empty:
+        return None, ()
+    remarks: tuple[str, ...] = ()
+    if body.volume < 0:
+        body, remarks = body.inside_out(), ("its triangles are inside out: turned",)
+    pieces = body.pieces()
+    if len(pieces) > 1 and not body.void_count:
+        whole = united(pieces)
+        if (common := body.volume - whole.volume) > _WELDED * whole.volume:
+            return whole, (*remarks, f"{len(pieces)} shells have {common:.4g} mm3 in common: united")
+    return body, remarks
+
+
+def _parted_edges(vertices: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+    """Vertices of their own for triangles that share an edge with more than one other: each is paired with one."""
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    count = len(vertices)
+    forward = edges[:, 0] < edges[:, 1]
+    keys = edges.min(axis=1) * count + edges.max(axis=1)
+    # The first use of an edge one way goes with its first use the other way, the second with the second.
+    ahead, behind = (np.flatnonzero(forward == way) for way in (True, False))
+    ahead, behind = ahead[np.argsort(keys[ahead], kind="stable")], behind[np.argsort(keys[behind], kind="stable")]
+    if not np.array_equal(keys[ahead], keys[behind]):
+        return vertices, triangles
+    # Corner k of a triangle begins its edge k; the edge ends at the next corner.
+    start, end = np.arange(triangles.size), np.arange(triangles.size).reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    joined = np.concatenate([start[ahead], end[ahead]]), np.concatenate([end[behind], start[behind]])
+    label = connected(triangles.size, *joined)
+    _, first = np.unique(label, return_index=True)
+    return vertices[triangles.ravel()[first]], label.reshape(-1, 3)
+
+
+def mended(vertices: Floats, triangles: Integers) -> tuple[Body | None, tuple[str, ...]]:
+    """A body of triangles that are open, and what was done for it: corners welded, triangles turned, holes closed.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 2, 3]])
+    >>> body, remarks = mended(corners, sides)
+    >>> round(body.volume, 6), remarks
+    (0.166667, ('1 triangle turned', '1 hole closed, 3 edges round (0.333, 0.333, 0.333)'))
+    """
+    size = float(np.ptp(vertices, axis=0).max())
+    pairs = cKDTree(vertices).query_pairs(_WELDED * size, output_type="ndarray")
+    label = connected(len(vertices), pairs[:, 0], pairs[:, 1])
+    welded = len(vertices) - int(label.max(initial=-1)) - 1
+    _, first = np.unique(label, return_index=True)
+    vertices, triangles = vertices[first], label[triangles]
+    triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    triangles, turned = _turned_alike(triangles[np.sort(first)])
+    remarks = [
+        f"{_counted(number, what)} {done}"
+        for number, what, done in ((welded, "corner", "welded"), (turned, "triangle", "turned"))
+        if number
+    ]
+    holes = holes_of(vertices, triangles)
+    if holes:
+        remarks.append(f"{_counted(len(holes), 'hole')} closed, {'the largest of ' * (len(holes) > 1)}{holes[0]}")
+    body, more = sound_body(*_holes_closed(vertices, triangles))
+    return body, (*remarks, *more)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"1 {what}" if number == 1 else f"{number} {what}s"
+
+
+def _turned_alike(triangles: Integers) -> tuple[Integers, int]:
+    """Triangles turned so that neighbours agree, the fewer of each shell; and how many were.
+
+    Every triangle is there twice, as it is and turned; what agrees is connected.
+    """
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    forward, owner = edges[:, 0] < edges[:, 1], np.repeat(np.arange(len(triangles)), 3)
+    keys = edges.min(axis=1) * (int(triangles.max(initial=0)) + 1) + edges.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    pair = np.flatnonzero(np.diff(keys[order]) == 0)
+    one, other = order[pair], order[pair + 1]
+    # Two that run along an edge the same way agree if one of them is turned.
+    against = (forward[one] == forward[other]).astype(np.int64)
+    first, second = owner[one], owner[other]
+    ends = [
+        np.concatenate([2 * first, 2 * first + 1]),
+        np.concatenate([2 * second + against, 2 * second + 1 - against]),
+    ]
+    label = connected(2 * len(triangles), ends[0], ends[1])
+    turned = label[1::2] < label[::2]
+    shell = np.minimum(label[::2], label[1::2])
+    most = np.bincount(shell, turned) > 0.5 * np.bincount(shell)
+    turned ^= most[shell]
+    return np.where(turned[:, np.newaxis], triangles[:, ::-1], triangles), int(turned.sum())
+
+
+def _holes_closed(vertices: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+    """Holes closed by triangles from their edges to their middles."""
+    edges, label = open_edges(triangles, len(vertices))
+    if not len(edges):
+        return vertices, triangles
+    ends = np.bincount(label).astype(float)[:, np.newaxis]
+    middles = np.stack([np.bincount(label, vertices[edges[:, 0], k]) for k in range(3)], axis=1) / ends
+    fans = np.column_stack([edges[:, ::-1], len(vertices) + label])
+    return np.concatenate([vertices, middles]), np.concatenate([triangles, fans])

@@ -17,13 +17,16 @@ from OCP.IntTools import IntTools_Context
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_OUT, TopAbs_State
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
-from gyroid_cad.kernel.part import measure
+from gyroid_cad.kernel.part import triangles_of
 from gyroid_cad.kernel.split import inner_point
+from gyroid_cad.mesh.triangles.distances import SignedDistances
+from gyroid_cad.mesh.triangles.files import numbered_corners
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
 
-__all__ = ["Depths", "FaceDistances", "points_on"]
+__all__ = ["Depths", "FaceDistances", "NearDistances", "points_on"]
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +40,9 @@ _ON_OPENING = 1e-4
 _FOLLOWED, _TRIES, _ROUNDS, _REACH = 6, 24, 5, 0.4
 # What is so much deeper than asked for need not be known better.
 _ENOUGH = 1.2
+# Of triangles that distances are measured from, in parts of a level, and in parts of the faces' extent; how far off
+# a distance from them may be, in deflections.
+_DEFLECTION, _COARSE, _FINE, _BAND = 1e-2, 1e-3, 1e-4, 2.0
 
 
 class FaceDistances:
@@ -48,12 +54,12 @@ class FaceDistances:
     """
 
     def __init__(self, faces: Iterable[TopoDS_Shape]) -> None:
-        self._faces = list(faces)
-        corners = [corners_of(box_round([face])) for face in self._faces]
+        self.faces = list(faces)
+        corners = [corners_of(box_round([face])) for face in self.faces]
         self._low, self._high = np.array(corners).reshape(-1, 2, 3).transpose(1, 0, 2)
 
     def __bool__(self) -> bool:
-        return bool(self._faces)
+        return bool(self.faces)
 
     def distance(self, point: Floats) -> float:
         """Distance of a point, shape (3,), from the nearest face, in mm; infinite if there are none."""
@@ -64,7 +70,7 @@ class FaceDistances:
         for index in np.argsort(at_least).tolist():
             if at_least[index] >= nearest:
                 break
-            found = BRepExtrema_DistShapeShape(vertex, self._faces[index])
+            found = BRepExtrema_DistShapeShape(vertex, self.faces[index])
             if found.IsDone():
                 nearest = min(nearest, found.Value())
         return float(nearest)
@@ -72,6 +78,32 @@ class FaceDistances:
     def distances(self, points: Floats) -> Floats:
         """Distances of points, shape (n, 3), from the nearest face, in mm; shape (n,)."""
         return np.array([self.distance(point) for point in points])
+
+
+class NearDistances:
+    """Distances of points from faces: exact where they are about a level, elsewhere from triangles.
+
+    Parameters
+    ----------
+    faces : iterable of TopoDS_Shape
+    level : float
+        In mm.
+    """
+
+    def __init__(self, faces: Iterable[TopoDS_Shape], level: float) -> None:
+        some = list(faces)
+        self._exact, self._level = FaceDistances(some), level
+        extent = float(np.ptp(corners_of(box_round(some)), axis=0).max())
+        deflection = max(min(_DEFLECTION * level, _COARSE * extent), _FINE * extent)
+        vertices, triangles, _ = numbered_corners(triangles_of(compound_of(some), deflection))
+        self._triangles, self._band = SignedDistances(vertices, triangles), _BAND * deflection
+
+    def __call__(self, points: Floats, level: float | None = None) -> Floats:
+        """Distances of points, shape (n, 3), in mm, exact about another level if one is given; shape (n,)."""
+        found = np.abs(self._triangles(points))
+        near = np.abs(found - (self._level if level is None else level)) < self._band
+        found[near] = self._exact.distances(points[near])
+        return found
 
 
 class Depths:
@@ -85,24 +117,33 @@ class Depths:
     """
 
     def __init__(self, solid: TopoDS_Solid, openings: Sequence[TopoDS_Face]) -> None:
-        self._solid, self._openings = solid, list(openings)
+        self._openings = list(openings)
         faces = parts_of(solid, TopAbs_FACE)
         self.kept = FaceDistances(face for face in faces if not any(face.IsSame(opening) for opening in openings))
         self.opened = FaceDistances(openings)
         self._random = np.random.default_rng(0)
+        self._solid = _Inside(solid)
+        self._near: dict[float, NearDistances] = {}
+
+    def _depths(self, points: Floats, skin: float, times: float = 1.0) -> Floats:
+        """Depths of points, exact about so many times a skin, in mm; shape (n,)."""
+        if skin not in self._near:
+            self._near[skin] = NearDistances(self.kept.faces, skin)
+        return self._near[skin](points, times * skin)
 
     def deepest(self, enough: float) -> float:
         """About how deep the deepest place lies, in mm; or how deep one does that is well deeper than is enough."""
-        points, depths = self._inside
+        points = self._inside
+        depths = self._depths(points, enough)
         for reach in _REACH * 0.5 ** np.arange(_ROUNDS):
             if len(depths) == 0 or depths.max() > _ENOUGH * enough:
                 break
             best = np.argsort(depths)[-_FOLLOWED:]
             steps = self._random.normal(size=(_TRIES, len(best), 3)) * (reach * depths[best])[:, np.newaxis]
             tried = (points[best] + steps).reshape(-1, 3)
-            tried = tried[self._held(tried)]
+            tried = tried[self._solid.contains(tried)]
             points = np.concatenate([points[best], tried])
-            depths = np.concatenate([depths[best], self.kept.distances(tried)])
+            depths = np.concatenate([depths[best], self._depths(tried, enough)])
         return float(depths.max(initial=0.0))
 
     def confirm(self, core: Sequence[TopoDS_Solid], skin: float) -> bool:
@@ -110,51 +151,59 @@ class Depths:
         if not core or any(measure(one)[0] <= 0 or not is_valid(one) or not topology(one).closed for one in core):
             return False
         least, most = _THINNEST * skin, _THICKEST * skin
+        outside = self._depths(self._inside, skin, _THINNEST) < least
+        inside = self._depths(self._inside, skin, _THICKEST) > most
+        in_core = np.any([_Inside(one).contains(self._inside) for one in core], axis=0)
+        if np.any(in_core[outside]) or not np.all(in_core[inside]):
+            return False
         states = [BRepClass3d_SolidClassifier(one) for one in core]
-
-        def state_in_core(point: Floats) -> list[TopAbs_State]:
-            return [_state(classifier, point) for classifier in states]
-
-        points, depths = self._inside
-        for point, depth in zip(points, depths.tolist(), strict=True):
-            if (depth < least or depth > most) and (TopAbs_IN in state_in_core(point)) != (depth > most):
-                return False
         for face in self._openings:
             points = points_on(face, _POINTS_ON_FACE)
             for point in points[self.kept.distances(points) > most]:
-                if all(state == TopAbs_OUT for state in state_in_core(point)):
+                if all(_state(classifier, point) == TopAbs_OUT for classifier in states):
                     return False
         faces = (face for one in core for face in parts_of(one, TopAbs_FACE))
         return all(self._as_deep(as_face(face), skin) for face in faces)
 
     def _as_deep(self, face: TopoDS_Face, skin: float) -> bool:
-        classifier = BRepClass3d_SolidClassifier(self._solid)
-        for point in points_on(face, _POINTS_ON_FACE):
-            depth = self.kept.distance(point)
-            if depth < _THINNEST * skin:
-                return False
-            if self.opened.distance(point) > _ON_OPENING * skin and (
-                depth > _THICKEST * skin or _state(classifier, point) != TopAbs_IN
-            ):
-                return False
-        return True
+        points = points_on(face, _POINTS_ON_FACE)
+        if np.any(self._depths(points, skin) < _THINNEST * skin):
+            return False
+        below = points[[self.opened.distance(point) > _ON_OPENING * skin for point in points]]
+        return bool(
+            np.all(self._depths(below, skin, _THICKEST) <= _THICKEST * skin) and np.all(self._solid.contains(below))
+        )
 
     @cached_property
-    def _inside(self) -> tuple[Floats, Floats]:
-        """Points all over the solid, shape (n, 3), and their depths."""
-        low, high = corners_of(box_round([self._solid]))
+    def _inside(self) -> Floats:
+        """Points all over the solid, shape (n, 3)."""
         found: list[Floats] = []
         for _ in range(_BATCHES):
-            points = self._random.uniform(low, high, (_POINTS_INSIDE, 3))
-            found.append(points[self._held(points)])
+            points = self._random.uniform(self._solid.low, self._solid.high, (_POINTS_INSIDE, 3))
+            found.append(points[self._solid.contains(points)])
             if sum(map(len, found)) >= _POINTS_INSIDE:
                 break
-        inside = np.concatenate(found)[:_POINTS_INSIDE]
-        return inside, self.kept.distances(inside)
+        return np.concatenate(found)[:_POINTS_INSIDE]
 
-    def _held(self, points: Floats) -> NDArray[np.bool_]:
-        classifier = BRepClass3d_SolidClassifier(self._solid)
-        return np.array([_state(classifier, point) == TopAbs_IN for point in points], dtype=bool)
+
+class _Inside:
+    """Tell which points lie in a solid: triangles tell, and the kernel of those that are near its boundary."""
+
+    def __init__(self, solid: TopoDS_Solid) -> None:
+        self.low, self.high = corners_of(box_round([solid]))
+        self._classifier = BRepClass3d_SolidClassifier(solid)
+        deflection = _COARSE * float((self.high - self.low).max())
+        vertices, triangles, _ = numbered_corners(triangles_of(solid, deflection))
+        self._band = _BAND * deflection if not unmatched_edges(triangles) else np.inf
+        self._distances = SignedDistances(vertices, triangles)
+
+    def contains(self, points: Floats) -> NDArray[np.bool_]:
+        """Mask of the points, shape (n, 3), that lie inside; shape (n,)."""
+        distances = self._distances(points)
+        inside = distances < 0
+        for index in np.flatnonzero(np.abs(distances) < self._band).tolist():
+            inside[index] = _state(self._classifier, points[index]) == TopAbs_IN
+        return np.asarray(inside)
 
 
 def points_on(face: TopoDS_Face, count: int) -> Floats:

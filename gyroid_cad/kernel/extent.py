@@ -1,16 +1,29 @@
-"""Boxes round shapes: a quick one for searching, and the tightest one."""
+"""Boxes: round shapes, a quick one for searching and the tightest one, and the one that a solid is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
-from OCP.TopoDS import TopoDS_Shape
+from OCP.GeomAbs import GeomAbs_Plane
+from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
+from OCP.TopExp import TopExp
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
-__all__ = ["bounding_box", "box_round", "corners_of"]
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_vertex
+from gyroid_cad.trim.box import Box
+
+__all__ = ["bounding_box", "box_of", "box_round", "corners_of"]
+
+_BOX_FACES, _BOX_CORNERS = 6, 8
+# How far from square a box may be, in radians and in parts of its largest extent.
+_SQUARE = 1e-9
 
 
 def box_round(shapes: Iterable[TopoDS_Shape]) -> Bnd_Box:
@@ -33,3 +46,29 @@ def bounding_box(shape: TopoDS_Shape) -> NDArray[np.float64]:
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, box, False, False)
     return np.zeros((2, 3)) if box.IsVoid() else corners_of(box)
+
+
+def box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
+    """The box that the solids are, if they are one box: six planes, and eight corners where a box has them."""
+    if len(solids) != 1:
+        return None
+    faces = [as_face(face) for face in parts_of(solids[0], TopAbs_FACE)]
+    if len(faces) != _BOX_FACES or any(BRepAdaptor_Surface(face).GetType() != GeomAbs_Plane for face in faces):
+        return None
+    corners = NumberedShapes()
+    TopExp.MapShapes_s(solids[0], TopAbs_VERTEX, corners)
+    places = (BRep_Tool.Pnt_s(as_vertex(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
+    points = np.array([(place.X(), place.Y(), place.Z()) for place in places])
+    normals = [BRepAdaptor_Surface(face).Plane().Axis().Direction() for face in faces]
+    directions = np.array([(normal.X(), normal.Y(), normal.Z()) for normal in normals])
+    first = directions[0]
+    across = [direction for direction in directions if abs(direction @ first) < _SQUARE]
+    if len(points) != _BOX_CORNERS or not across:
+        return None
+    axes = np.stack([first, across[0], np.cross(first, across[0])], axis=1)
+    along = points @ axes
+    low, high = along.min(axis=0), along.max(axis=0)
+    size = float(np.max(high - low))
+    ends = np.minimum(np.abs(along - low), np.abs(along - high))
+    upper = {tuple(row) for row in (along > (low + high) / 2).tolist()}
+    return Box(axes, low, high) if ends.max() < _SQUARE * size and len(upper) == _BOX_CORNERS else None

@@ -1,7 +1,7 @@
-"""The kernel's ways to offset a solid, tried in a process of its own.
+"""Ways to offset a solid, the kernel's and one of our own, tried in a process of their own.
 
-They crash on some solids, and not every time; on others they do not end. What they give is not to be trusted either:
-that is for :mod:`gyroid_cad.kernel.offset` to find out.
+The kernel's are quick on simple solids. They crash on some others, and not every time, or do not end: then pieces are
+cut against each other. What any way gives is not trusted, but looked at.
 """
 
 from __future__ import annotations
@@ -32,23 +32,30 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.ordered import in_order, sorted_by_place
 from gyroid_cad.kernel.processes import Started, started
+from gyroid_cad.kernel.sieve import core_of_pieces
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
 
 Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 
 _TOLERANCE = 1e-5
-_SECONDS_AT_MOST, _SECONDS_BETWEEN_LOOKS = 60.0, 0.02
-_SOLID = "solid.bin"
+# The kernel's own ways are quick where they work at all; those that are not crash or do not end.
+_SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _SECONDS_BETWEEN_LOOKS = 60.0, 5.0, 0.02
+_PIECES = "pieces"
+_SOLID, _REASON = "solid.bin", "reason.txt"
 
 
 def offsets(
-    solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, ways: Sequence[str]
+    solid: TopoDS_Solid,
+    openings: Sequence[TopoDS_Face],
+    skin: float,
+    ways: Sequence[str],
+    reasons: list[str] | None = None,
 ) -> Generator[TopoDS_Shape | None]:
     """Solids that each way of offsetting leaves inside a skin; None where one fails, crashes or does not end.
 
@@ -61,6 +68,8 @@ def offsets(
         In mm.
     ways : sequence of str
         Of ``OPEN_WAYS`` and ``CLOSED_WAYS``.
+    reasons : list of str, optional
+        To which is added why a way failed, where it says so.
     """
     numbers = [k for k, face in enumerate(parts_of(solid, TopAbs_FACE)) if any(face.IsSame(one) for one in openings)]
     with TemporaryDirectory() as folder:
@@ -77,11 +86,14 @@ def offsets(
             if left:
                 left.pop(0)
                 yield None
+        if reasons is not None and Path(folder, _REASON).exists():
+            reasons.append(Path(folder, _REASON).read_text(encoding="utf-8"))
 
 
 def _awaited(process: Started, path: Path) -> Path | None:
     """The path once there is a file; None if the process ends before, or takes too long."""
-    end = time.monotonic() + _SECONDS_AT_MOST
+    at_most = _SECONDS_AT_MOST if path.name == _PIECES else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
+    end = time.monotonic() + at_most
     while not path.exists():
         ended = process.wait(_SECONDS_BETWEEN_LOOKS) is not None
         if time.monotonic() > end or (ended and not path.exists()):
@@ -103,9 +115,11 @@ def work(folder: str, skin: str, numbers: str, *ways: str) -> None:
             # Surfaces that are the offset of another do not survive STEP files.
             plain = ShapeCustom.ConvertToBSpline_s(core, False, False, True, False)
             BinTools.Write_s(plain.Moved(place), str(unfinished))
-        except Exception:
+        except Exception as failed:
             # The kernel has as many kinds of failure as it has algorithms, and some are no exceptions of its own.
             unfinished.write_bytes(b"")
+            if isinstance(failed, KernelError):
+                Path(folder, _REASON).write_text(str(failed), encoding="utf-8")
         unfinished.rename(Path(folder, way))
 
 
@@ -136,6 +150,10 @@ def _place(shape: TopoDS_Shape) -> TopLoc_Location:
             BRep_Tool.Surface_s(as_face(face), place)
             return place
     return shape.Location()
+
+
+def _of_pieces(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> TopoDS_Shape:
+    return compound_of(core_of_pieces(solid, skin))
 
 
 def _less_thick_skin(
@@ -169,6 +187,7 @@ OPEN_WAYS: Mapping[str, Way] = MappingProxyType(
 CLOSED_WAYS: Mapping[str, Way] = MappingProxyType(
     {
         "arcs": partial(_shrunk, join=GeomAbs_Arc, together=True),
+        _PIECES: _of_pieces,
         "arcs, face by face": partial(_shrunk, join=GeomAbs_Arc, together=False),
         "sharp": partial(_shrunk, join=GeomAbs_Intersection, together=True),
     }
@@ -212,20 +231,25 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
     KernelError
         If none of the kernel's ways to offset gives a core whose points lie as deep as they should.
     """
-    with closing(_attempts(solid, openings, skin)) as attempts:
+    reasons: list[str] = []
+    with closing(_attempts(solid, openings, skin, reasons)) as attempts:
         for core in attempts:
             if depths.confirm(core, skin):
                 # What goes on from here is the same at every run.
                 ordered = sorted_by_place(map(in_order, core))
                 return ordered if all(is_valid(one) and topology(one).closed for one in ordered) else core
-    raise KernelError(f"the kernel cannot offset the part by {skin:g} mm; without a skin it can still be filled")
+    why = "".join(f": {reason}" for reason in reasons)
+    remedy = "another thickness may do, a core of your own (core) does, and without a skin it can still be filled"
+    raise KernelError(f"the kernel cannot offset the part by {skin:g} mm{why}; {remedy}")
 
 
-def _attempts(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> Generator[list[TopoDS_Solid]]:
+def _attempts(
+    solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, reasons: list[str]
+) -> Generator[list[TopoDS_Solid]]:
     ways = list(CLOSED_WAYS)
     if openings and sum(1 for _ in parts_of(solid, TopAbs_SHELL)) == 1:
         ways = [*OPEN_WAYS, *ways]
-    with closing(offsets(solid, openings, skin, ways)) as found:
+    with closing(offsets(solid, openings, skin, ways, reasons)) as found:
         for way, core in zip(ways, found, strict=True):
             if core is not None:
                 yield _solids_in(_opened(core, openings, skin) if way in CLOSED_WAYS else core)

@@ -10,18 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_MakeVertex
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.GeomAbs import GeomAbs_Plane
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
-from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID, TopAbs_VERTEX
-from OCP.TopExp import TopExp
+from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
@@ -29,8 +26,8 @@ from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, measure, parts_of
-from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_solid, as_vertex
-from gyroid_cad.kernel.extent import bounding_box
+from gyroid_cad.kernel.compat import as_face, as_solid
+from gyroid_cad.kernel.extent import bounding_box, box_of
 from gyroid_cad.kernel.repair import fault_of
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
@@ -49,6 +46,7 @@ __all__ = [
     "selected_faces",
     "selected_way",
     "spread_points",
+    "triangles_of",
 ]
 
 Floats = NDArray[np.float64]
@@ -61,11 +59,11 @@ _ANGULAR_DEFLECTION = 0.5
 # beyond its deflection here and there: within so many times it the kernel is asked.
 _INSIDE_DEFLECTIONS, _BAND = np.array([1e-4, 4e-5]), 2.0
 _CLASSIFYING_TOLERANCE = 1e-7
+# Where the thickness is looked at: at so many places at most, so many along the largest extent, by balls of which each
+# has so much of the last; and how near the next face they may come, in parts of their radius.
+_THICKNESS_PLACES, _THICKNESS_STEPS, _SMALLER, _AS_DEEP = 1500, 60, 0.9, 0.98
 # Of a part that takes up little of its box fewer points are found than are asked for.
 _MOST_BATCHES = 8
-_BOX_FACES, _BOX_CORNERS = 6, 8
-# How far from square a box may be, in radians and in parts of its largest extent.
-_SQUARE = 1e-9
 
 
 # Without slots, so that its mesh is kept once it is made.
@@ -83,6 +81,8 @@ class Part:
         In mm3.
     box : Box, optional
         If the part is one solid and that is a box.
+    area : float
+        Of the boundary, in mm2.
     """
 
     shape: TopoDS_Shape
@@ -91,6 +91,7 @@ class Part:
     high: Floats
     volume: float
     box: Box | None = None
+    area: float = 0.0
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,).
@@ -135,6 +136,28 @@ class Part:
         """Points spread at random over the inside, the same ones each time; shape (n, 3), as many as are wanted."""
         return points_within(self.low, self.high, self.contains, count)
 
+    def thickest(self, enough: float) -> float:
+        """About how thick the part is where it is thickest, in mm: the largest ball that fits into it.
+
+        Parameters
+        ----------
+        enough : float
+            A part that is thicker than this somewhere need not be known better.
+        """
+        smallest = float(np.min(self.high - self.low))
+        if self.box is not None or smallest <= enough:
+            return smallest
+        points, normals, _ = self.surface_samples(float(np.max(self.high - self.low)) / _THICKNESS_STEPS)
+        chosen = np.random.default_rng(0).permutation(len(points))[:_THICKNESS_PLACES]
+        points, normals = points[chosen], normals[chosen]
+        signed, band = self._signed_distances
+        if signed is None:
+            return smallest
+        radius = enough / 2 / _AS_DEEP
+        while not np.any(signed(points - radius * normals) <= band - _AS_DEEP * radius):
+            radius *= _SMALLER
+        return 2 * radius
+
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.
 
@@ -154,6 +177,14 @@ class Part:
         clouds = [spread_points(*triangles, spacing) for triangles in self._meshed(deflection)]
         points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
         return points, normals, spacing + deflection
+
+
+def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
+    """Corners of triangles no further from a shape's faces than a deflection in mm; shape (triangles, 3, 3)."""
+    copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
+    # In one thread, so that a process may be forked from this one.
+    BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
+    return np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(copy))])
 
 
 def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:
@@ -185,36 +216,10 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
         if fault := fault_of(solid, "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"):
             raise ParameterError(parameter, kind, fault)
     low, high = bounding_box(shape)
-    volume = sum(measure(solid)[0] for solid in solids)
+    volume, area = (sum(sizes) for sizes in zip(*map(measure, solids), strict=True))
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
-    return Part(divided, solids, low, high, volume, _box_of(solids))
-
-
-def _box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
-    """The box that the solids are, if they are one box: six planes, and eight corners where a box has them."""
-    if len(solids) != 1:
-        return None
-    faces = [as_face(face) for face in parts_of(solids[0], TopAbs_FACE)]
-    if len(faces) != _BOX_FACES or any(BRepAdaptor_Surface(face).GetType() != GeomAbs_Plane for face in faces):
-        return None
-    corners = NumberedShapes()
-    TopExp.MapShapes_s(solids[0], TopAbs_VERTEX, corners)
-    places = (BRep_Tool.Pnt_s(as_vertex(corners.FindKey(k))) for k in range(1, corners.Extent() + 1))
-    points = np.array([(place.X(), place.Y(), place.Z()) for place in places])
-    normals = [BRepAdaptor_Surface(face).Plane().Axis().Direction() for face in faces]
-    directions = np.array([(normal.X(), normal.Y(), normal.Z()) for normal in normals])
-    first = directions[0]
-    across = [direction for direction in directions if abs(direction @ first) < _SQUARE]
-    if len(points) != _BOX_CORNERS or not across:
-        return None
-    axes = np.stack([first, across[0], np.cross(first, across[0])], axis=1)
-    along = points @ axes
-    low, high = along.min(axis=0), along.max(axis=0)
-    size = float(np.max(high - low))
-    ends = np.minimum(np.abs(along - low), np.abs(along - high))
-    upper = {tuple(row) for row in (along > (low + high) / 2).tolist()}
-    return Box(axes, low, high) if ends.max() < _SQUARE * size and len(upper) == _BOX_CORNERS else None
+    return Part(divided, solids, low, high, volume, box_of(solids), area)
 
 
 def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:

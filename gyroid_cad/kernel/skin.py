@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.BRepTools import BRepTools_ReShape
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Wire
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of
@@ -27,7 +26,8 @@ from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.split import Change, Pieces, general_fuse, inner_sides, modified, solids_of
+from gyroid_cad.kernel.sieve import with_changes
+from gyroid_cad.kernel.split import Pieces, general_fuse, inner_sides, modified, solids_of
 
 __all__ = ["Hollow", "has_face", "hollow", "hollow_round", "openings_of"]
 
@@ -89,7 +89,7 @@ class Hollow:
             for piece, origin, inner in boundary
             if inner == self.opened[origin]
         ]
-        skin = _with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
+        skin = with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
         return solids_of([*skin, *pieces.inside, *map(as_face, whole), *ends])
 
 
@@ -288,21 +288,6 @@ def _require_all_of(part: Part, made: Hollow) -> None:
     core = measure(made.core.shape)[0]
     if not abs(skin + core - part.volume) < _SAME_VOLUME * part.volume or not is_valid(made.core.shape):
         raise KernelError("the kernel parted the part wrongly into skin and core")
-
-
-def _with_changes(faces: Iterable[TopoDS_Face], changed: Iterable[Change]) -> list[TopoDS_Face]:
-    """The faces with the edges and vertices that have been split or made anew in place of the old ones."""
-    builder, reshape = BRep_Builder(), BRepTools_ReShape()
-    for old, new in changed:
-        if old.ShapeType() == TopAbs_EDGE:
-            wire = TopoDS_Wire()
-            builder.MakeWire(wire)
-            for edge in new:
-                builder.Add(wire, edge)
-            reshape.Replace(old, wire)
-        else:
-            reshape.Replace(old, new[0])
-    return [as_face(reshape.Apply(face)) for face in faces]
 
 
 def _faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:

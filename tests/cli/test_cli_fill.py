@@ -171,11 +171,11 @@ def test_a_file_cut_short_is_refused(capsys: Captured, peg: Path, part: float) -
         (["--density", "0.3", "--angle", "90"], "--angle"),
         (
             ["--thickness", "6", "--cell-size", "20"],
-            "--thickness = '6': expected a wall below the part's smallest",
+            "--thickness = '6': expected a wall below the part's thickness",
         ),
         (
             ["--density", "0.9", "--cell-size", "20"],
-            "--density = '0.9': expected a wall below the part's smallest",
+            "--density = '0.9': expected a wall below the part's thickness",
         ),
         (["--density", "0.3 + q"], "--density"),
         (["--density", "0.3", "--skin", "-1"], "--skin = -1.0"),

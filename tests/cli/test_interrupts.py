@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -44,7 +45,9 @@ def interrupted(run: subprocess.Popen[str]) -> None:
     assert run.poll() is None, "it was done before it could be interrupted"
     os.killpg(run.pid, signal.SIGINT)
     out, err = run.communicate(timeout=PATIENCE)
-    assert (out, err) == ("", "gyroid-cad: error: interrupted\n")
+    # Of what takes long its stages are told before.
+    assert (out, err.splitlines()[-1:]) == ("", ["gyroid-cad: error: interrupted"])
+    assert all(re.match(r" *\d+\.\d s  ", line) for line in err.splitlines()[:-1])
     # Interrupted in text that it executes, such as a dataclass's, Python leaves by the signal: to shells it is 130 too.
     assert run.returncode in (130, -signal.SIGINT)
 

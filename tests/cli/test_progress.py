@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ from gyroid_cad.cli import fill as cli_fill
 from gyroid_cad.cli import mesh as cli_mesh
 from gyroid_cad.cli.app import main
 from gyroid_cad.cli.bars import terminal_progress
+from gyroid_cad.cli.console import shown_progress
 
 Told = list[tuple[str, int, int]]
 
@@ -28,7 +30,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Told:
     steps: Told = []
 
     @contextmanager
-    def listening(shown: bool) -> Iterator[object]:
+    def listening(shown: bool, lines: bool = False) -> Iterator[object]:
         yield lambda *step: steps.append(step)
 
     for module in (cli_build, cli_fill, cli_mesh):
@@ -109,6 +111,36 @@ def test_fill_tells_of_faces_split_and_of_every_file(told: Told, tmp_path: Path)
     assert done == total > 1
     assert fractions(told, "split")[-1] == (1, 1)
     assert fractions(told, "write a.brep") == [(0, 1), (1, 1)]
+
+
+def test_fill_forecasts_what_it_takes_before_it_begins_and_prints_a_line_a_stage_into_logs(
+    told: Told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part, filled = tmp_path / "part.step", tmp_path / "a.brep"
+    cadquery.exporters.export(cadquery.Workplane().box(4, 4, 4), str(part))
+    command = ["fill", str(part), "-o", str(filled), "--cell-size", "8", "--density", "0.3", "--control-points", "5"]
+    monkeypatch.setattr(cli_fill, "shown_progress", shown_progress)
+    # What takes no longer than this is not told of.
+    monkeypatch.setattr("gyroid_cad.cli.console.SILENT_SECONDS", 0.0)
+    assert main(command) == 0
+    lines = [line.split(" s  ", 1) for line in capsys.readouterr().err.splitlines()]
+    stages = [stage for _, stage in lines]
+    assert stages.pop(0) == "read"
+    assert re.fullmatch(r"about \d+ crossings, \d+ faces, .* GB of memory, .* MB of STEP, \d+ s", stages[0])
+    assert stages == list(dict.fromkeys(stages))
+    assert stages[-1] == "write a.brep"
+    assert [float(seconds) for seconds, _ in lines] == sorted(float(seconds) for seconds, _ in lines)
+    assert main([*command, "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_the_time_that_remains_of_all_is_the_forecasts_less_what_has_passed(display: list[Progress]) -> None:
+    with terminal_progress() as update:
+        update("about 300 crossings", 0, 50)
+        (shown,) = display
+        (column,) = (column for column in shown.columns if isinstance(column, TimeRemainingColumn))
+        (task,) = shown.tasks
+        assert str(column.render(task)) in ("0:00:50", "0:00:49")
 
 
 def test_mesh_and_volumes_tell_of_every_stage(told: Told, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 
 from gyroid_cad.errors import IslandsWarning, ParameterError, PartWarning
 from gyroid_cad.filling.fill import Filled, fill
-from gyroid_cad.filling.part import parts_of
+from gyroid_cad.filling.part import bodies_of
 from gyroid_cad.surface.fit import FitSettings
 
 CELL, DENSITY, SIDE = 8.0, 0.2, 4.0
@@ -72,12 +72,12 @@ def assembly_file(folder: Path) -> Path:
 def test_bodies_of_an_assembly_are_chosen_by_the_names_or_numbers_of_its_file(
     chosen: Any, volumes: list[float], tmp_path: Path
 ) -> None:
-    parts, _ = parts_of(assembly_file(tmp_path), chosen)
+    parts, _ = bodies_of(assembly_file(tmp_path), chosen)
     assert [part.volume for _, part in parts] == pytest.approx(volumes)
 
 
 def test_a_body_of_an_assembly_stands_where_the_assembly_has_it(tmp_path: Path) -> None:
-    ((title, bolt),) = parts_of(assembly_file(tmp_path), ["bolt"])[0]
+    ((title, bolt),) = bodies_of(assembly_file(tmp_path), ["bolt"])[0]
     assert title == "solid 2 of 3 (bolt)"
     np.testing.assert_allclose(bolt.low, [20, 0, 50], atol=1e-6)
 
@@ -90,7 +90,7 @@ def test_assemblies_of_hosts_have_names_too() -> None:
     left.label, right.label = "left", "right"
     of_build123d = bd.Compound(label="pair", children=[left, right])
     for pair, low, volume in ((of_cadquery, 10, SIDE**3), (of_build123d, 19, 8)):
-        ((_, part),) = parts_of(pair, ["right"])[0]
+        ((_, part),) = bodies_of(pair, ["right"])[0]
         assert (part.low[0], part.volume) == pytest.approx((low, volume), abs=1e-6)
 
 

@@ -311,7 +311,7 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"material_density": 7850}, "g/cm3, at most 100: of water it is 1"),
         ({"lattice": Lattice((1, 1, 1), 10, 1, scale_field=1e300), "cell_size": None, "thickness": None}, "at most 1"),
         ({"material_density": -1}, "material_density = -1"),
-        ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's smallest extent, 0.5 mm"),
+        ({"part": cq.Workplane().box(9, 9, 0.5)}, "a wall below the part's thickness, about 0.5 mm"),
     ],
 )
 def test_what_cannot_be_filled_is_refused_in_one_line(given: dict[str, Any], words: str) -> None:

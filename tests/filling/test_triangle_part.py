@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from gyroid_cad import ParameterError
-from gyroid_cad.filling.triangle_part import triangle_part
-from gyroid_cad.mesh.triangles.repair import holes_of, mended, sound_body
+from gyroid_cad.filling.triangle_part import mended, sound_body, triangle_part
+from gyroid_cad.mesh.triangles.measures import holes_of
 
 
 def cube(low: float = 0.0, high: float = 2.0) -> tuple[Any, Any]:

@@ -1,0 +1,397 @@
+"""Offsets of a solid's faces inwards, each with the borders of its own, and tubes and balls round what points inwards.
+
+Every place of a skin's inner side is on one of these pieces: on the offset of a face that is no larger than the face,
+on a tube round an edge that points into the material, or on a ball round a corner that does. So nothing is extended.
+Faces that pass into each other smoothly share the offset of their common edge, a tube shares an edge with the offsets
+on either side of it: what only touches is joined here, and never sought as a crossing. At edges that point outwards
+the offsets run through each other, and end where nothing is kept.
+
+An offset has the parameters of its face, so that curves in the parameter plane bound both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.Geom import Geom_Circle, Geom_SphericalSurface
+from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
+from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
+from OCP.TopExp import TopExp
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
+
+from gyroid_cad.common.arrays import unit
+from gyroid_cad.common.graph import connected
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex
+from gyroid_cad.kernel.offset_surface import (
+    FaceOffset,
+    between,
+    closed_form_curve,
+    curve_points,
+    derivatives,
+    plane_points,
+    tube_round,
+    vector_of,
+)
+from gyroid_cad.kernel.spline_fit import fitted_curve, fitted_plane_curve
+
+__all__ = ["offset_pieces"]
+
+Floats = NDArray[np.float64]
+
+# Of fitted curves and surfaces, in parts of the offset.
+_TOLERANCE = 1e-4
+# Sine of an angle between normals on either side of an edge below which the edge is smooth.
+_SMOOTH = 5e-3
+_SAMPLES = 9
+_SAME = 1e-12
+_LEAST_TOLERANCE = 1e-7
+# Number of a face that stands for both on either side of a smooth edge.
+_SHARED = -1
+# Of what is measured between samples, which may be more elsewhere.
+_MARGIN = 1.5
+_CLOSELY = 36
+
+
+@dataclass(slots=True)
+class _Side:
+    """A face on one side of an edge: its index, the edge as it runs round it, and the curve in its plane."""
+
+    face: int
+    edge: TopoDS_Edge
+    curve: Geom2d_Curve
+    parameters: Floats
+    normals: Floats
+    tangents: Floats
+
+
+def offset_pieces(solid: TopoDS_Solid, by: float) -> list[TopoDS_Face]:
+    """Faces, oriented like the solid's, among which is all of the inner side of a skin, and more.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+        Without faces that close on themselves.
+    by : float
+        Thickness of the skin, in mm.
+
+    Raises
+    ------
+    KernelError
+        If an offset cannot be fitted.
+    """
+    return _Pieces(solid, by).made()
+
+
+class _Pieces:
+    def __init__(self, solid: TopoDS_Solid, by: float) -> None:
+        self.by, self.tolerance = by, _TOLERANCE * by
+        self.builder, self.place = BRep_Builder(), TopLoc_Location()
+        self.faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
+        self.offsets = [FaceOffset(face, by, self.tolerance) for face in self.faces]
+        self.edges, self.vertices = NumberedShapes(), NumberedShapes()
+        TopExp.MapShapes_s(solid, TopAbs_EDGE, self.edges)
+        TopExp.MapShapes_s(solid, TopAbs_VERTEX, self.vertices)
+        self.sides: dict[int, list[_Side]] = {}
+        for index, face in enumerate(self.faces):
+            for shape in parts_of(face.Oriented(TopAbs_FORWARD), TopAbs_EDGE):
+                self.sides.setdefault(self.edges.FindIndex(shape), []).append(self._side(index, as_edge(shape)))
+        self.bends = {number: _bend(*sides) for number, sides in self.sides.items() if len(sides) == 2}
+        self.ends: dict[int, tuple[int, int]] = {}
+        for number in self.sides:
+            edge = as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD))
+            self.ends[number] = (
+                self.vertices.FindIndex(TopExp.FirstVertex_s(edge)),
+                self.vertices.FindIndex(TopExp.LastVertex_s(edge)),
+            )
+        self.places, self.corners = self._corners()
+        self.made_vertices: dict[int, TopoDS_Vertex] = {}
+        self.made_edges: dict[tuple[int, int], TopoDS_Edge] = {}
+        self.arcs: dict[tuple[int, frozenset[int]], _Arc] = {}
+
+    def made(self) -> list[TopoDS_Face]:
+        faces = [self._offset_face(index) for index in range(len(self.faces)) if self.offsets[index].surface]
+        tubes = [self._tube(number) for number, bend in self.bends.items() if bend.min() < -_SMOOTH]
+        balls = [ball for vertex in range(1, self.vertices.Extent() + 1) for ball in self._balls(vertex)]
+        return [*faces, *tubes, *balls]
+
+    def _side(self, index: int, edge: TopoDS_Edge) -> _Side:
+        face = self.faces[index]
+        first, last = BRep_Tool.Range_s(edge)
+        curve = BRep_Tool.CurveOnSurface_s(edge, as_face(face.Oriented(TopAbs_FORWARD)), first, last)
+        parameters = np.linspace(first, last, _SAMPLES)
+        places = plane_points(curve, parameters)
+        offset = self.offsets[index]
+        sign = offset.outwards * (-1.0 if edge.Orientation() == TopAbs_REVERSED else 1.0)
+        return _Side(index, edge, curve, parameters, offset.normals(places), sign * offset.tangents(curve, parameters))
+
+    def _smooth(self, number: int) -> bool:
+        bend = self.bends.get(number)
+        return bend is not None and bool(np.abs(bend).max() < _SMOOTH)
+
+    def _corners(self) -> tuple[dict[int, list[Floats]], dict[tuple[int, int], int]]:
+        """What faces' offsets make of corners, numbered: places by number, and numbers by corner and face.
+
+        Offsets of faces that are smooth at a corner make one place of it.
+        """
+        numbers: dict[tuple[int, int], int] = {}
+        places: list[Floats] = []
+        joined: list[list[int]] = []
+        for number, sides in self.sides.items():
+            for at, end in zip((0, -1), self.ends[number], strict=True):
+                for side in sides:
+                    if (end, side.face) not in numbers:
+                        numbers[end, side.face] = len(places)
+                        place = plane_points(side.curve, side.parameters[[at]])
+                        places.append(self.offsets[side.face].points(place)[0])
+                if number in self.bends and abs(self.bends[number][at]) < _SMOOTH:
+                    joined.append([numbers[end, side.face] for side in sides])
+        labels = connected(len(places), *np.array(joined, dtype=np.int64).reshape(-1, 2).T).tolist()
+        by_label: dict[int, list[Floats]] = {}
+        for place, label in zip(places, labels, strict=True):
+            by_label.setdefault(label, []).append(place)
+        return by_label, {corner: labels[index] for corner, index in numbers.items()}
+
+    def _vertex(self, corner: int) -> TopoDS_Vertex:
+        if corner not in self.made_vertices:
+            middle = np.mean(self.places[corner], axis=0)
+            reach = float(np.linalg.norm(self.places[corner] - middle, axis=1).max())
+            made = TopoDS_Vertex()
+            self.builder.MakeVertex(made, gp_Pnt(*middle.tolist()), _MARGIN * reach + _LEAST_TOLERANCE)
+            self.made_vertices[corner] = made
+        return self.made_vertices[corner]
+
+    def _edge(self, number: int, face: int) -> TopoDS_Edge:
+        """The edge that an edge becomes on a face's offset; at smooth edges both faces share it."""
+        key = (number, _SHARED if self._smooth(number) else face)
+        if key in self.made_edges:
+            return self.made_edges[key]
+        sides = [side for side in self.sides[number] if side.face == face or key[1] == _SHARED]
+        sides = [side for side in sides if self.offsets[side.face].surface] or sides
+        first, last = sides[0].parameters[[0, -1]].tolist()
+        original = as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD))
+        edge, off = self._bare_edge(original, sides, first, last)
+        ends = [self._vertex(self.corners[end, sides[0].face]) for end in self.ends[number]]
+        self._bound(edge, ends, first, last, off)
+        for one in {one.face: one for one in sides}.values():
+            surface = self.offsets[one.face].surface
+            if surface is None:
+                continue
+            # At a seam the curve of the edge as it runs forwards comes first.
+            backwards = [other.edge.Orientation() == TopAbs_REVERSED for other in sides]
+            order = sorted(range(len(sides)), key=backwards.__getitem__)
+            curves = [sides[index].curve for index in order if sides[index].face == one.face]
+            self.builder.UpdateEdge(edge, *curves, surface, self.place, off)
+        self.made_edges[key] = edge
+        return edge
+
+    def _bare_edge(
+        self, original: TopoDS_Edge, sides: Sequence[_Side], first: float, last: float
+    ) -> tuple[TopoDS_Edge, float]:
+        """An edge without ends, and how far it is at most from the offsets it lies on."""
+
+        def points(parameters: Floats, side: _Side = sides[0]) -> Floats:
+            return self.offsets[side.face].points(plane_points(side.curve, parameters))
+
+        edge, sampled = TopoDS_Edge(), points(sides[0].parameters)
+        if np.linalg.norm(sampled - sampled[0], axis=1).max() < self.tolerance:
+            self.builder.MakeEdge(edge)
+            self.builder.Degenerated(edge, True)
+            return edge, _LEAST_TOLERANCE
+        curve = None if BRep_Tool.Degenerated_s(original) else closed_form_curve(original, points, first, last)
+        if curve is None:
+            curve = fitted_curve(points, [first, last], self.tolerance)
+        parameters = np.linspace(first, last, _CLOSELY)
+        on_curve = curve_points(curve, parameters)
+        away = [
+            float(np.linalg.norm(self.offsets[side.face].on_surface(places) - on_curve, axis=1).max())
+            for side in sides
+            for places in [plane_points(side.curve, parameters)]
+        ]
+        off = _MARGIN * max(away) + _LEAST_TOLERANCE
+        self.builder.MakeEdge(edge, curve, off)
+        return edge, off
+
+    def _bound(
+        self, edge: TopoDS_Edge, ends: Sequence[TopoDS_Vertex], first: float, last: float, tolerance: float
+    ) -> None:
+        for end, way in zip(ends, (TopAbs_FORWARD, TopAbs_REVERSED), strict=True):
+            self.builder.Add(edge, end.Oriented(way))
+            self.builder.UpdateVertex(end, tolerance)
+        self.builder.Range(edge, first, last)
+
+    def _offset_face(self, index: int) -> TopoDS_Face:
+        forward, made = self.faces[index].Oriented(TopAbs_FORWARD), TopoDS_Face()
+        self.builder.MakeFace(made, self.offsets[index].surface, self.place, _LEAST_TOLERANCE)
+        for shape in parts_of(forward, TopAbs_WIRE):
+            wire = TopoDS_Wire()
+            self.builder.MakeWire(wire)
+            for edge in parts_of(shape.Oriented(TopAbs_FORWARD), TopAbs_EDGE):
+                new = self._edge(self.edges.FindIndex(edge), index)
+                self.builder.Add(wire, new.Oriented(edge.Orientation()))
+            wire.Closed(True)
+            self.builder.Add(made, wire.Oriented(shape.Orientation()))
+        return as_face(made.Oriented(self.faces[index].Orientation()))
+
+    def _tube(self, number: int) -> TopoDS_Face:
+        sides = self.sides[number]
+        first, last = sides[0].parameters[[0, -1]].tolist()
+        curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
+        ways = [partial(self._inwards, side) for side in sides]
+        tube = tube_round(curve, ways[0], ways[1], self.by, self.tolerance)
+        made, wire, off = TopoDS_Face(), TopoDS_Wire(), _MARGIN * self.tolerance
+        self.builder.MakeFace(made, tube.surface, self.place, _LEAST_TOLERANCE)
+        self.builder.MakeWire(wire)
+        borders = [self._edge(number, side.face) for side in sides]
+        for border, across in zip(borders, (0.0, 1.0), strict=True):
+            line = _straight(tube.place(across, first), tube.place(across, last), first, last)
+            self.builder.UpdateEdge(border, line, tube.surface, self.place, off)
+        (low, low_backwards), (high, high_backwards) = arcs = [
+            self._arc(number, at, parameter) for at, parameter in ((0, first), (-1, last))
+        ]
+        lines = [
+            _straight(tube.place(float(backwards), at), tube.place(1.0 - backwards, at), 0.0, arc.angle)
+            for (arc, backwards), at in zip(arcs, (first, last), strict=True)
+        ]
+        if low is high:
+            lines = lines if low_backwards else lines[::-1]
+            self.builder.UpdateEdge(low.edge, *lines, tube.surface, self.place, off)
+        else:
+            for (arc, _), line in zip(arcs, lines, strict=True):
+                self.builder.UpdateEdge(arc.edge, line, tube.surface, self.place, off)
+        # Anticlockwise in the plane of (across, along), and the other way where the surface's parameters run so.
+        middle = (first + last) / 2
+        origin, beside, beyond = (tube.place(*at) for at in ((0.5, middle), (1.0, middle), (0.5, last)))
+        turned = float(np.linalg.det([beside - origin, beyond - origin])) < 0
+        loop = [
+            (low.edge, low_backwards),
+            (borders[1], False),
+            (high.edge, not high_backwards),
+            (borders[0], True),
+        ]
+        for edge, backwards in loop:
+            self.builder.Add(wire, edge.Oriented(TopAbs_REVERSED if backwards != turned else TopAbs_FORWARD))
+        wire.Closed(True)
+        self.builder.Add(made, wire)
+        point, along_u, along_v = (some[0] for some in derivatives(tube.surface, origin[np.newaxis]))
+        towards = curve_points(curve, np.array([middle]))[0] - point
+        outwards = float(np.cross(along_u, along_v) @ towards) > 0
+        return as_face(made.Oriented(TopAbs_FORWARD if outwards else TopAbs_REVERSED))
+
+    def _inwards(self, side: _Side, parameters: Floats) -> Floats:
+        return -self.offsets[side.face].normals(plane_points(side.curve, parameters))
+
+    def _arc(self, number: int, at: int, parameter: float) -> tuple[_Arc, bool]:
+        """The arc that ends the tube round an edge, and whether it runs from the second side to the first.
+
+        Tubes that go on in each other share it.
+        """
+        sides, vertex = self.sides[number], self.ends[number][at]
+        corners = [self.corners[vertex, side.face] for side in sides]
+        key = (vertex, frozenset(corners))
+        if key not in self.arcs:
+            start, stop = (self._inwards(side, np.array([parameter]))[0] for side in sides)
+            place = BRep_Tool.Pnt_s(as_vertex(self.vertices.FindKey(vertex)))
+            edge = TopoDS_Edge()
+            angle = float(np.arctan2(np.linalg.norm(np.cross(start, stop)), start @ stop))
+            if corners[0] == corners[1] or angle * self.by < self.tolerance:
+                angle = 1.0
+                self.builder.MakeEdge(edge)
+                self.builder.Degenerated(edge, True)
+            else:
+                axes = gp_Ax2(place, gp_Dir(*np.cross(start, stop).tolist()), gp_Dir(*start.tolist()))
+                self.builder.MakeEdge(edge, Geom_Circle(axes, self.by), _MARGIN * self.tolerance)
+            self._bound(edge, [self._vertex(corner) for corner in corners], 0.0, angle, _MARGIN * self.tolerance)
+            self.arcs[key] = _Arc(edge, (corners[0], corners[1]), vector_of(place), start, stop, angle)
+        arc = self.arcs[key]
+        arc.uses += 1
+        return arc, arc.corners[0] != corners[0]
+
+    def _balls(self, vertex: int) -> Iterator[TopoDS_Face]:
+        """The piece of a ball that arcs which bound only one tube each leave open round a corner."""
+        arcs = [arc for (at, _), arc in self.arcs.items() if at == vertex and arc.uses == 1]
+        arcs = [arc for arc in arcs if not BRep_Tool.Degenerated_s(arc.edge)]
+        while arcs:
+            loop = [arcs.pop()]
+            start, end = loop[0].corners
+            while end != start:
+                following = [arc for arc in arcs if end in arc.corners]
+                if len(following) != 1:
+                    return
+                arcs.remove(following[0])
+                loop.append(following[0])
+                end = next(corner for corner in following[0].corners if corner != end)
+            yield self._ball(loop)
+
+    def _ball(self, loop: list[_Arc]) -> TopoDS_Face:
+        centre = loop[0].centre
+        towards = unit(np.sum([unit(arc.start + arc.stop) for arc in loop], axis=0))
+        side = unit(np.cross(towards, np.eye(3)[np.argmin(np.abs(towards))]))
+        # Seam and poles lie as far away as they can.
+        axes = gp_Ax3(gp_Pnt(*centre.tolist()), gp_Dir(*side.tolist()), gp_Dir(*(-towards).tolist()))
+        surface = Geom_SphericalSurface(axes, self.by)
+        third = np.cross(side, -towards)
+        made, wire = TopoDS_Face(), TopoDS_Wire()
+        self.builder.MakeFace(made, surface, self.place, _LEAST_TOLERANCE)
+        self.builder.MakeWire(wire)
+        turned, end = [], loop[0].corners[0]
+        corners = []
+        for arc in loop:
+            forwards = arc.corners[0] == end
+            end = arc.corners[1] if forwards else arc.corners[0]
+
+            def places(parameters: Floats, arc: _Arc = arc) -> Floats:
+                ways = between(arc.start[np.newaxis], arc.stop[np.newaxis], parameters / arc.angle)[:, 0]
+                u = np.arctan2(ways @ third, ways @ -towards) % (2 * np.pi)
+                return np.stack([u, np.arcsin(np.clip(ways @ side, -1, 1))], axis=1)
+
+            line = fitted_plane_curve(places, [0.0, arc.angle], self.tolerance / self.by)
+            self.builder.UpdateEdge(arc.edge, line, surface, self.place, 3 * self.tolerance)
+            turned.append(arc.edge.Oriented(TopAbs_FORWARD if forwards else TopAbs_REVERSED))
+            shown = places(np.linspace(0, arc.angle, _SAMPLES))
+            corners += list(shown if forwards else shown[::-1])[:-1]
+        x, y = np.array(corners).T
+        anticlockwise = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) > 0
+        for edge in turned if anticlockwise else [edge.Reversed() for edge in reversed(turned)]:
+            self.builder.Add(wire, edge)
+        wire.Closed(True)
+        self.builder.Add(made, wire)
+        # A ball's own normal runs away from its centre, where the core's runs towards it.
+        return as_face(made.Oriented(TopAbs_REVERSED))
+
+
+@dataclass(slots=True)
+class _Arc:
+    """An edge on the ball round a corner, between what two faces' offsets make of the corner."""
+
+    edge: TopoDS_Edge
+    corners: tuple[int, int]
+    centre: Floats
+    start: Floats
+    stop: Floats
+    angle: float
+    uses: int = 0
+
+
+def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_Curve:
+    """The straight line from a place to another between two parameters."""
+    way, length = stop - start, float(np.linalg.norm(stop - start))
+    if abs(length - (last - first)) < _SAME * (last - first):
+        origin = start - way / length * first
+        return Geom2d_Line(gp_Pnt2d(*origin.tolist()), gp_Dir2d(*way.tolist()))
+    return fitted_plane_curve(
+        lambda parameters: start + np.outer((parameters - first) / (last - first), way), [first, last], _SAME
+    )
+
+
+def _bend(one: _Side, other: _Side) -> Floats:
+    """Sine of the angle by which normals turn across an edge: above 0 where it points outwards; shape (n,)."""
+    return np.asarray(np.sum(one.tangents * np.cross(one.normals, other.normals), axis=1))

@@ -1,0 +1,340 @@
+"""The offset of one face inwards: in closed form where its kind has one, else a spline fitted to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepTools import BRepTools
+from OCP.Geom import (
+    Geom_BSplineSurface,
+    Geom_Circle,
+    Geom_Curve,
+    Geom_CylindricalSurface,
+    Geom_Line,
+    Geom_OffsetSurface,
+    Geom_RectangularTrimmedSurface,
+    Geom_Surface,
+    Geom_ToroidalSurface,
+)
+from OCP.Geom2d import Geom2d_Curve
+from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
+from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
+
+from gyroid_cad.common.arrays import unit
+from gyroid_cad.kernel.spline_fit import fitted_surface
+from gyroid_cad.kernel.surfaces import nurbs_of_surface
+from gyroid_cad.nurbs.surface import NurbsSurface
+
+__all__ = [
+    "FaceOffset",
+    "Tube",
+    "between",
+    "closed_form_curve",
+    "curve_points",
+    "derivatives",
+    "plane_points",
+    "tube_round",
+    "vector_of",
+]
+
+Floats = NDArray[np.float64]
+
+# Of lengths of 1 mm, or in parts of larger ones.
+_SAME = 1e-9
+# How short one derivative is beside the other where a side of a face is a point, and how far off that place the
+# normal is taken, in parts of the face.
+_POLE, _BESIDE = 1e-7, 1e-6
+# By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
+_LEAST_STRETCH = 1e-4
+_SAMPLES, _STEP = 9, 1e-5
+_ACROSS = (0.0, 0.5, 1.0)
+
+
+class FaceOffset:
+    """The offset of a face inwards, which has the face's parameters.
+
+    Parameters
+    ----------
+    face : TopoDS_Face
+        Oriented out of its solid.
+    by : float
+        In mm.
+    tolerance : float
+        Of a fit, in mm.
+
+    Attributes
+    ----------
+    surface : Geom_Surface, optional
+        None where the face is bent so narrowly that nothing of its offset bounds a core.
+    outwards : float
+        1 if the face's parameters go round its outward normal anticlockwise, else -1.
+
+    Raises
+    ------
+    KernelError
+        If no spline comes near enough.
+    """
+
+    def __init__(self, face: TopoDS_Face, by: float, tolerance: float) -> None:
+        self.base = BRep_Tool.Surface_s(face)
+        if isinstance(self.base, Geom_RectangularTrimmedSurface):
+            self.base = self.base.BasisSurface()
+        self._net = _net(self.base)
+        self.outwards = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
+        self.by = by
+        self.bounds = np.array(BRepTools.UVBounds_s(face)).reshape(2, 2)
+        self.surface: Geom_Surface | None = None
+        if not self.bent_away():
+            self.surface = self._closed_form() or self._fitted(tolerance)
+
+    def _derivatives(self, places: Floats) -> tuple[Floats, Floats, Floats]:
+        if self._net is None:
+            return derivatives(self.base, places)
+        # The kernel is asked for one place at a time, which takes a hundred times as long.
+        found = self._net.derivatives(*places.T)
+        return found[0, 0], found[1, 0], found[0, 1]
+
+    def normals(self, places: Floats) -> Floats:
+        """Unit normals out of the solid at parameters, shape (n, 2); shape (n, 3)."""
+        _, along_u, along_v = self._derivatives(places)
+        found = np.cross(along_u, along_v)
+        spans = np.ptp(self.bounds, axis=1)
+        lengths = np.stack([np.linalg.norm(some, axis=1) for some in (along_u, along_v)]) * spans[:, np.newaxis]
+        poles = lengths.min(axis=0) < _POLE * lengths.max(axis=0)
+        if poles.any():
+            # At a pole: the normal of what is next to it.
+            moved = places[poles] + _BESIDE * (self.bounds.mean(axis=1) - places[poles])
+            _, beside_u, beside_v = self._derivatives(moved)
+            found[poles] = np.cross(beside_u, beside_v)
+        return self.outwards * unit(found)
+
+    def tangents(self, curve: Geom2d_Curve, parameters: Floats) -> Floats:
+        """Unit tangents on the face of a curve in its parameter plane; shape (n, 3)."""
+        place, way = gp_Pnt2d(), gp_Vec2d()
+        places, ways = np.empty((len(parameters), 2)), np.empty((len(parameters), 2))
+        for index, parameter in enumerate(parameters.tolist()):
+            curve.D1(parameter, place, way)
+            places[index], ways[index] = (place.X(), place.Y()), (way.X(), way.Y())
+        _, along_u, along_v = self._derivatives(places)
+        return unit(ways[:, :1] * along_u + ways[:, 1:] * along_v)
+
+    def bent_away(self) -> bool:
+        """True where the face is bent more than the offset is wide, all over: then nothing of it bounds a core."""
+        places = self._grid(_SAMPLES)
+        step = _STEP * np.ptp(self.bounds, axis=1)
+        _, along_u, along_v = self._derivatives(places)
+        moved = [
+            (self.points(places + shift) - self.points(places - shift)) / (2 * step[way])
+            for way, shift in enumerate(np.diag(step))
+        ]
+        basis = np.stack([along_u, along_v], axis=-1)
+        stretch = np.linalg.pinv(basis) @ np.stack(moved, axis=-1)
+        return bool(np.all(np.linalg.eigvals(stretch).real.min(axis=1) < _LEAST_STRETCH))
+
+    def points(self, places: Floats) -> Floats:
+        """Points of the offset at parameters, shape (n, 2); shape (n, 3)."""
+        return self._derivatives(places)[0] - self.by * self.normals(places)
+
+    def on_surface(self, places: Floats) -> Floats:
+        """Points of the surface, a fit's too, at parameters, shape (n, 2); shape (n, 3)."""
+        return self.points(places) if self.surface is None else derivatives(self.surface, places)[0]
+
+    def _closed_form(self) -> Geom_Surface | None:
+        try:
+            surface = Geom_OffsetSurface(self.base, -self.by * self.outwards).Surface()
+        except Exception:
+            return None
+        if surface is None:
+            return None
+        places = self._grid(_SAMPLES)
+        off = np.linalg.norm(derivatives(surface, places)[0] - self.points(places), axis=1).max()
+        return surface if off < _SAME * max(1.0, float(np.abs(self.points(places)).max())) else None
+
+    def _fitted(self, tolerance: float) -> Geom_Surface | None:
+        def points(u: Floats, v: Floats) -> Floats:
+            grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+            return self.points(grid).reshape(len(u), len(v), 3)
+
+        breaks_u, breaks_v = (_breaks(self.base, way, *self.bounds[way].tolist()) for way in (0, 1))
+        return fitted_surface(points, breaks_u, breaks_v, tolerance)
+
+    def _grid(self, count: int) -> Floats:
+        """So many places along either side, none of them on a side, which may be a point; shape (n, 2)."""
+        u, v = (np.linspace(low, high, count + 2)[1:-1] for low, high in self.bounds)
+        return np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _net(surface: Geom_Surface) -> NurbsSurface | None:
+    """Arrays of a B-spline surface that has ends along both sides."""
+    if not isinstance(surface, Geom_BSplineSurface) or surface.IsUPeriodic() or surface.IsVPeriodic():
+        return None
+    return nurbs_of_surface(surface)
+
+
+def _breaks(surface: Geom_Surface, way: int, low: float, high: float) -> list[float]:
+    """Knots of a surface between two parameters along u or v, these among them."""
+    knots: list[float] = []
+    if isinstance(surface, Geom_BSplineSurface):
+        count = (surface.NbUKnots, surface.NbVKnots)[way]()
+        knot, times = ((surface.UKnot, surface.UMultiplicity), (surface.VKnot, surface.VMultiplicity))[way]
+        degree = (surface.UDegree, surface.VDegree)[way]()
+        # Where the surface is no smoother than its tangents, its offset has a kink: such knots come twice.
+        for index in range(1, count + 1):
+            knots += (2 if times(index) >= degree - 1 else 1) * [knot(index)]
+    span = high - low
+    return [low, *(value for value in knots if low + 1e-6 * span < value < high - 1e-6 * span), high]
+
+
+def curve_points(curve: Geom_Curve | BRepAdaptor_Curve, parameters: Floats) -> Floats:
+    """Points of a curve, shape (n, 3)."""
+    found = [curve.Value(parameter) for parameter in parameters.tolist()]
+    return np.array([(point.X(), point.Y(), point.Z()) for point in found])
+
+
+def plane_points(curve: Geom2d_Curve, parameters: Floats) -> Floats:
+    """Places on a curve in a parameter plane, shape (n, 2)."""
+    found = [curve.Value(parameter) for parameter in parameters.tolist()]
+    return np.array([(point.X(), point.Y()) for point in found])
+
+
+def derivatives(surface: Geom_Surface, places: Floats) -> tuple[Floats, Floats, Floats]:
+    """Points of a surface and its derivatives along u and v at parameters, shape (n, 2); shape (n, 3) each."""
+    point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+    found = np.empty((3, len(places), 3))
+    for index, (u, v) in enumerate(places.tolist()):
+        surface.D1(u, v, point, along_u, along_v)
+        found[0, index] = point.X(), point.Y(), point.Z()
+        found[1, index] = along_u.X(), along_u.Y(), along_u.Z()
+        found[2, index] = along_v.X(), along_v.Y(), along_v.Z()
+    return found[0], found[1], found[2]
+
+
+def closed_form_curve(
+    edge: TopoDS_Edge, points_at: Callable[[Floats], Floats], first: float, last: float
+) -> Geom_Curve | None:
+    """The line or the circle that the points of an edge's offset lie on, with its parameter, if they do."""
+    kind = BRepAdaptor_Curve(edge).GetType()
+    parameters = np.linspace(first, last, _SAMPLES)
+    points = points_at(parameters)
+    if kind == GeomAbs_Line:
+        way = (points[-1] - points[0]) / (last - first)
+        origin = points[0] - first * way
+        curve: Geom_Curve = Geom_Line(gp_Pnt(*origin.tolist()), gp_Dir(*way.tolist()))
+    elif kind == GeomAbs_Circle:
+        axis = BRepAdaptor_Curve(edge).Circle().Axis().Direction()
+        normal = np.array([axis.X(), axis.Y(), axis.Z()])
+        # Two radii are perpendicular to their tangents; the centre is where their planes meet the circle's.
+        tangents = [np.cross(normal, points[i + 1] - points[i - 1]) for i in (1, _SAMPLES - 2)]
+        across = [points[i + 1] - points[i - 1] for i in (1, _SAMPLES - 2)]
+        matrix = np.array([*across, normal])
+        if abs(np.linalg.det(matrix)) < _SAME * np.prod(np.linalg.norm(matrix, axis=1)) or not tangents:
+            return None
+        centre = np.linalg.solve(matrix, [across[0] @ points[1], across[1] @ points[-2], normal @ points[0]])
+        radial = points[0] - centre
+        start = np.cos(first) * radial - np.sin(first) * np.cross(normal, radial)
+        axes = gp_Ax2(gp_Pnt(*centre.tolist()), gp_Dir(*normal.tolist()), gp_Dir(*start.tolist()))
+        curve = Geom_Circle(axes, float(np.linalg.norm(radial)))
+    else:
+        return None
+    off = np.linalg.norm(curve_points(curve, parameters) - points, axis=1).max()
+    return curve if off < _SAME * max(1.0, float(np.abs(points).max())) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tube:
+    """A tube's surface, and where on it the tube is.
+
+    Attributes
+    ----------
+    surface : Geom_Surface
+    place : callable
+        Parameters of the surface, shape (2,), for how far across the tube, from 0 to 1, and a parameter along it.
+    """
+
+    surface: Geom_Surface
+    place: Callable[[float, float], Floats]
+
+
+def tube_round(
+    curve: BRepAdaptor_Curve,
+    start_at: Callable[[Floats], Floats],
+    stop_at: Callable[[Floats], Floats],
+    by: float,
+    tolerance: float,
+) -> Tube:
+    """A tube round a curve: a cylinder round a line, a torus round a circle, else a fitted spline.
+
+    Parameters
+    ----------
+    curve : BRepAdaptor_Curve
+    start_at, stop_at : callable
+        Directions from the curve to the tube's borders at parameters of the curve, shape (n, 3).
+    by, tolerance : float
+        The tube's radius, and that of a fit, in mm.
+
+    Raises
+    ------
+    KernelError
+        If no spline comes near enough.
+    """
+    first, last = curve.FirstParameter(), curve.LastParameter()
+    parameters = np.linspace(first, last, _SAMPLES)
+
+    def points(across: Floats, along: Floats) -> Floats:
+        return curve_points(curve, along) + by * between(start_at(along), stop_at(along), across)
+
+    expected = points(np.array(_ACROSS), parameters)
+    start, stop = start_at(parameters[:1])[0], stop_at(parameters[:1])[0]
+    for tube in (_cylinder(curve, start, stop, by), _torus(curve, start, stop, by)):
+        if tube is not None:
+            places = np.array([tube.place(across, along) for across in _ACROSS for along in parameters.tolist()])
+            off = np.abs(derivatives(tube.surface, places)[0] - expected.reshape(-1, 3)).max()
+            if off < _SAME * max(1.0, float(np.abs(expected).max())):
+                return tube
+    surface = fitted_surface(points, [0.0, 1.0], [first, last], tolerance)
+    return Tube(surface, lambda across, along: np.array([across, along]))
+
+
+def _cylinder(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
+    if curve.GetType() != GeomAbs_Line:
+        return None
+    line = curve.Line()
+    angle = float(np.arctan2(vector_of(line.Direction()) @ np.cross(start, stop), start @ stop))
+    axes = gp_Ax3(line.Location(), line.Direction(), gp_Dir(*start.tolist()))
+    return Tube(Geom_CylindricalSurface(axes, by), lambda across, along: np.array([across * angle, along]))
+
+
+def _torus(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
+    if curve.GetType() != GeomAbs_Circle or curve.Circle().Radius() <= (1 + _SAME) * by:
+        return None
+    circle = curve.Circle()
+    axis = vector_of(circle.Axis().Direction())
+    radial = unit(curve_points(curve, np.array([curve.FirstParameter()]))[0] - vector_of(circle.Location()))
+    angles = [float(np.arctan2(way @ axis, way @ radial)) for way in (start, stop)]
+    angle = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
+    axes = gp_Ax3(circle.Location(), circle.Axis().Direction(), circle.XAxis().Direction())
+    surface = Geom_ToroidalSurface(axes, circle.Radius(), by)
+    return Tube(surface, lambda across, along: np.array([along, angles[0] + across * angle]))
+
+
+def vector_of(given: gp_Pnt | gp_Dir) -> Floats:
+    """Coordinates of a point or a direction, shape (3,)."""
+    return np.array([given.X(), given.Y(), given.Z()])
+
+
+def between(one: Floats, other: Floats, across: Floats) -> Floats:
+    """Unit vectors on great circles from some to others, each shape (n, 3), so far across; shape (k, n, 3)."""
+    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
+    sines = np.sin(angles)
+    flat = sines < _SAME
+    safe = np.where(flat, 1.0, sines)
+    a = np.where(flat, 1 - across[:, np.newaxis], np.sin((1 - across)[:, np.newaxis] * angles) / safe)
+    b = np.where(flat, across[:, np.newaxis], np.sin(across[:, np.newaxis] * angles) / safe)
+    return np.asarray(a[..., np.newaxis] * one + b[..., np.newaxis] * other)

@@ -1,0 +1,142 @@
+"""The core that a skin leaves: offset pieces, cut against each other, of which those are kept that are deep enough."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BOPAlgo import BOPAlgo_Builder
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepTools import BRepTools_ReShape
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_Orientation
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Solid, TopoDS_Wire
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.kernel.check import compound_of, parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
+from gyroid_cad.kernel.depth import NearDistances, points_on
+from gyroid_cad.kernel.offset_pieces import offset_pieces
+from gyroid_cad.kernel.offset_surface import curve_points
+from gyroid_cad.kernel.split import Change, changes, modified, solids_of
+
+__all__ = ["core_of_pieces", "with_changes"]
+
+Floats = NDArray[np.float64]
+
+_POINTS_ON_PIECE, _POINTS_ON_EDGE = 24, 16
+# Of the thickness of a skin, by which the depth of what is kept may be less.
+_OFF = 1e-3
+# Share of the points on a piece that are to be as deep as the skin is thick: those near a crossing say little.
+_MOST = 0.5
+
+
+def core_of_pieces(solid: TopoDS_Solid, skin: float) -> list[TopoDS_Solid]:
+    """Offset a solid inwards by a skin, corner by corner whatever the corners are.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+    skin : float
+        In mm.
+
+    Raises
+    ------
+    KernelError
+        If what is kept does not close: it says where.
+    """
+    depths = NearDistances(parts_of(solid, TopAbs_FACE), skin)
+    pieces: list[TopoDS_Face] = []
+    deep: list[bool] = []
+    for piece in offset_pieces(solid, skin):
+        enough = depths(np.concatenate([points_on(piece, _POINTS_ON_PIECE), _border(piece)])) >= (1 - _OFF) * skin
+        if enough.any():
+            pieces.append(piece)
+            deep.append(bool(enough.all()))
+    # A piece without a neighbour may have one that was not made beside it, but only comes to it.
+    lone = {users[0][0] for users in _users(pieces).values() if len(users) == 1}
+    whole = [piece for index, piece in enumerate(pieces) if deep[index] and index not in lone]
+    crossing = [piece for index, piece in enumerate(pieces) if not deep[index] or index in lone]
+    if crossing:
+        fuse = _cut(crossing)
+        images = [as_face(image) for piece in crossing for image in modified(fuse, piece)]
+        kept = [image for image in images if _is_deep(image, skin, depths)]
+        whole = [*with_changes(whole, changes(fuse, compound_of(crossing))), *kept]
+    _require_closed(whole)
+    return solids_of(whole)
+
+
+def _cut(pieces: Iterable[TopoDS_Face]) -> BOPAlgo_Builder:
+    fuse = BOPAlgo_Builder()
+    fuse.SetNonDestructive(True)
+    for piece in pieces:
+        fuse.AddArgument(piece)
+    fuse.Perform()
+    if fuse.HasErrors():
+        raise KernelError("the kernel could not cut the offsets of the part's faces against each other")
+    return fuse
+
+
+def _is_deep(face: TopoDS_Face, skin: float, depths: NearDistances) -> bool:
+    return bool(np.mean(depths(points_on(face, _POINTS_ON_PIECE)) >= (1 - _OFF) * skin) > _MOST)
+
+
+def _border(face: TopoDS_Face) -> Floats:
+    """Points on a face's edges, shape (n, 3)."""
+    edges = [as_edge(edge) for edge in parts_of(face, TopAbs_EDGE)]
+    curves = [BRepAdaptor_Curve(edge) for edge in edges if not BRep_Tool.Degenerated_s(edge)]
+    return np.concatenate(
+        [
+            np.empty((0, 3)),
+            *(
+                curve_points(curve, np.linspace(curve.FirstParameter(), curve.LastParameter(), _POINTS_ON_EDGE))
+                for curve in curves
+            ),
+        ]
+    )
+
+
+def _users(faces: Sequence[TopoDS_Face]) -> dict[TopoDS_Edge, list[tuple[int, TopAbs_Orientation]]]:
+    """For every edge that is none shrunk to a point, the faces that it bounds, by index, and which way it runs."""
+    edges = NumberedShapes()
+    users: list[list[tuple[int, TopAbs_Orientation]]] = []
+    for index, face in enumerate(faces):
+        for edge in parts_of(face, TopAbs_EDGE):
+            if not BRep_Tool.Degenerated_s(as_edge(edge)):
+                number = edges.Add(edge)
+                users += [[] for _ in range(number - len(users))]
+                users[number - 1].append((index, edge.Orientation()))
+    return {as_edge(edges.FindKey(number)): some for number, some in enumerate(users, 1)}
+
+
+def _require_closed(faces: Sequence[TopoDS_Face]) -> None:
+    """Raise if an edge does not bound two faces, once in either direction."""
+    for edge, users in _users(faces).items():
+        if len(users) != 2 or users[0][1] == users[1][1]:
+            curve = BRepAdaptor_Curve(edge)
+            middle = (curve.FirstParameter() + curve.LastParameter()) / 2
+            place = ", ".join(f"{x:.4g}" for x in curve_points(curve, np.array([middle]))[0])
+            raise KernelError(f"the inner side of the skin does not close round ({place})")
+
+
+def with_changes(faces: Iterable[TopoDS_Face], changed: Iterable[Change]) -> list[TopoDS_Face]:
+    """The faces with the edges and vertices that have been split or made anew in place of the old ones.
+
+    Parameters
+    ----------
+    faces : iterable of TopoDS_Face
+    changed : iterable of (TopoDS_Shape, tuple of TopoDS_Shape)
+        As of :class:`gyroid_cad.kernel.split.Pieces`.
+    """
+    builder, reshape = BRep_Builder(), BRepTools_ReShape()
+    for old, new in changed:
+        if old.ShapeType() == TopAbs_EDGE:
+            wire = TopoDS_Wire()
+            builder.MakeWire(wire)
+            for edge in new:
+                builder.Add(wire, edge)
+            reshape.Replace(old, wire)
+        else:
+            reshape.Replace(old, new[0])
+    return [as_face(reshape.Apply(face)) for face in faces]

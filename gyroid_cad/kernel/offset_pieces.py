@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.Geom import Geom_Circle, Geom_SphericalSurface
+from OCP.Geom import Geom_Circle, Geom_Line, Geom_SphericalSurface
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
 from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
@@ -216,7 +216,8 @@ class _Pieces:
             for side in sides
             for places in [plane_points(side.curve, parameters)]
         ]
-        off = _MARGIN * max(away) + _LEAST_TOLERANCE
+        fit = 0.0 if isinstance(curve, Geom_Circle | Geom_Line) else self.tolerance
+        off = _MARGIN * max(*away, fit) + _LEAST_TOLERANCE
         self.builder.MakeEdge(edge, curve, off)
         return edge, off
 
@@ -261,16 +262,17 @@ class _Pieces:
             _straight(tube.place(float(backwards), at), tube.place(1.0 - backwards, at), 0.0, arc.angle)
             for (arc, backwards), at in zip(arcs, (first, last), strict=True)
         ]
-        if low is high:
-            lines = lines if low_backwards else lines[::-1]
-            self.builder.UpdateEdge(low.edge, *lines, tube.surface, self.place, off)
-        else:
-            for (arc, _), line in zip(arcs, lines, strict=True):
-                self.builder.UpdateEdge(arc.edge, line, tube.surface, self.place, off)
         # Anticlockwise in the plane of (across, along), and the other way where the surface's parameters run so.
         middle = (first + last) / 2
         origin, beside, beyond = (tube.place(*at) for at in ((0.5, middle), (1.0, middle), (0.5, last)))
         turned = float(np.linalg.det([beside - origin, beyond - origin])) < 0
+        if low is high:
+            # Of a seam the curve of the edge as it runs forwards comes first.
+            lines = lines if low_backwards == turned else lines[::-1]
+            self.builder.UpdateEdge(low.edge, *lines, tube.surface, self.place, off)
+        else:
+            for (arc, _), line in zip(arcs, lines, strict=True):
+                self.builder.UpdateEdge(arc.edge, line, tube.surface, self.place, off)
         loop = [
             (low.edge, low_backwards),
             (borders[1], False),

@@ -254,6 +254,10 @@ CASES: dict[str, dict[str, Case]] = {
             {"file": "made.stl", "route": "triangles", "deviation": 0.2},
             lambda made, usual: sized(made, usual) and (told(made, "no B-rep was made") or made.report["faces"] < 4000),
         ),
+        "repair": Case(
+            {"file": "made.stl", "route": "triangles", "deviation": 0.2, "repair": True},
+            sized,
+        ),
         "material density": Case({"material density": 2.7}, weighed),
         "lattice": Case(
             {"lattice": Lattice((2, 2, 2), CELL, density=0.2, origin=(-8, -8, -8), fit=FitSettings(4))},

@@ -52,7 +52,10 @@ __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
 # Of the part and of how it is filled, whatever lattice fills it.
-_OWN = ("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands", "material_density", "partial")
+_OWN = (
+    *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
+    *("repair", "material_density", "partial"),
+)
 
 
 def _take_files(context: click.Context, parameter: click.Parameter, files: tuple[str, ...]) -> str | None:
@@ -128,6 +131,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     help="Through exact solids, or through triangles alone, which serves every part and is faster; if left out, "
     "triangles where all files that are written hold triangles.",
 )
+@click.option("--repair", is_flag=True, help="Close a part of triangles that is open, and say what was done.")
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
 @deviation_option

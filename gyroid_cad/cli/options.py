@@ -77,8 +77,8 @@ deviation_option = click.option(
     "--deviation",
     type=float,
     metavar="MM",
-    help="Of the triangles in .stl, .3mf, .obj and .ply; a thousandth of the cell size if left out, or a tenth of a "
-    "thin wall.",
+    help="Of the triangles in .stl, .3mf, .obj and .ply; if left out a thousandth of the cell size or a tenth of a "
+    "thin wall; where a part is filled by triangles alone, four thousandths or a twentieth.",
 )
 angle_option = click.option(
     "--angle",

@@ -150,6 +150,7 @@ FILL = (
     _row("rotation"),
     _row("drop islands"),
     _row("route", **_NO_TRIANGLES),
+    _row("repair", **_NO_TRIANGLES),
     _row("material density", cadquery=Absent("a workplane keeps no report")),
     _row("lattice", Absent("described by `--cells` and what goes with it")),
     _row("cells", **_OF_BLOCK),

@@ -24,7 +24,7 @@ from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.level_set import Grid, level_surface, told_apart
 from gyroid_cad.trim.islands import SealedVoid
 
-__all__ = ["Shell", "core_within", "given_core", "opened_facets", "without_small_voids"]
+__all__ = ["Shell", "given_core", "opened_facets", "without_small_voids"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -60,7 +60,7 @@ class Shell:
 
     def core_of(
         self, part: TrianglePart, opened: Booleans | None, deviation: float
-    ) -> tuple[Body | None, float | None]:
+    ) -> tuple[TrianglePart | None, float | None]:
         """Core that the skin leaves of a part, if there is one, and how thin the skin is at least, in mm.
 
         Raises
@@ -68,10 +68,12 @@ class Shell:
         ParameterError
         """
         if self.core is not None:
-            return given_core(part, self.core, deviation)
+            inner, skin = given_core(part, self.core, deviation)
+            return TrianglePart(inner), skin
         if self.skin is None or opened is None:
             return None, None
-        return core_within(part, self.skin, opened, deviation), self.skin
+        depth = _Depth(part, self.skin, opened)
+        return TrianglePart(_core_within(part, self.skin, depth, deviation), depth=depth), self.skin
 
 
 class _Depth:
@@ -79,7 +81,7 @@ class _Depth:
 
     def __init__(self, part: TrianglePart, skin: float, opened: Booleans) -> None:
         vertices, triangles = part.body.triangles()
-        self._signed, self._skin, self._open = part.distances, skin, bool(opened.any())
+        self._signed, self._skin, self._open = part.facets, skin, bool(opened.any())
         self._walls = SignedDistances(vertices, triangles[~opened]) if self._open else self._signed
 
     def __call__(self, points: Floats) -> Floats:
@@ -109,7 +111,7 @@ class _Depth:
         return places, away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), np.finfo(float).tiny), wanted
 
 
-def core_within(part: TrianglePart, skin: float, opened: Booleans, deviation: float) -> Body:
+def _core_within(part: TrianglePart, skin: float, depth: _Depth, deviation: float) -> Body:
     """Body that a skin leaves of a part; through openings it reaches beyond.
 
     Parameters
@@ -117,8 +119,8 @@ def core_within(part: TrianglePart, skin: float, opened: Booleans, deviation: fl
     part : TrianglePart
     skin : float
         In mm.
-    opened : ndarray of bool, shape (triangles,)
-        Of the part's body: those at which there is no skin.
+    depth : callable
+        Below its inner side.
     deviation : float
         Largest distance of the inner side's triangles from where it should be, in mm.
 
@@ -127,7 +129,6 @@ def core_within(part: TrianglePart, skin: float, opened: Booleans, deviation: fl
     ParameterError
         If nothing is left, or the deviation would take too many points.
     """
-    depth = _Depth(part, skin, opened)
     # Chords of a surface that is rounded by no less than the skin, as it is round an edge that faces inwards.
     step = min(skin / _STEPS_IN_SKIN, float(np.sqrt(8 * deviation * skin)))
     for _ in range(_TRIES):
@@ -204,11 +205,17 @@ def without_small_voids(
     pieces: Sequence[Body], part: Body, middle: Floats, least: float
 ) -> tuple[list[Body], list[SealedVoid]]:
     """Pieces without voids below a volume in mm3, and the voids they seal but for the part's own, the largest first."""
-    left, voids = [], []
+    left: list[Body] = []
+    voids: list[SealedVoid] = []
+    own = part.moved(-middle) if part.void_count else None
     for piece in pieces:
-        sealed = [void & part.moved(-middle) for void in piece.voids()]
-        specks = [void for void in sealed if 0 < void.volume < least]
-        voids += [SealedVoid(void.volume, _point(void.centre + middle)) for void in sealed if void.volume >= least]
+        shells = piece.void_shells()
+        if own is not None:
+            shells = [shell for shell in shells if (shell.inside_out() & own).volume > 0]
+        voids += [
+            SealedVoid(-shell.volume, _point(shell.centre + middle)) for shell in shells if -shell.volume >= least
+        ]
+        specks = [shell.inside_out() for shell in shells if -shell.volume < least]
         left.append(piece | united(specks) if specks else piece)
     return left, sorted(voids, key=lambda void: -void.volume)
 
@@ -272,7 +279,7 @@ def _regions_at(part: TrianglePart, given: Any, vertices: Floats, triangles: Int
         point = three_numbers("openings", given)
     except ParameterError:
         raise ParameterError("openings", given, OPENINGS) from None
-    place = part.distances.nearest(point[np.newaxis])[0]
+    place = part.facets.nearest(point[np.newaxis])[0]
     if (away := float(np.linalg.norm(place - point))) > ON_FACE * float(np.max(part.high - part.low)):
         shown = tuple(point.tolist())
         raise ParameterError("openings", shown, f"a point on the part; the nearest is {away:.4g} mm away")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import ROUTES, Kind, Route, Schema, SurfaceName
+from gyroid_cad.common.choices import Kind, Route, Schema, SurfaceName
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
 from gyroid_cad.common.progress import Progress, named_progress, report_progress, timed
 from gyroid_cad.errors import ParameterError, PartWarning
@@ -24,7 +24,7 @@ from gyroid_cad.filling.forecast import require_cover
 from gyroid_cad.filling.infill import described_infill
 from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_islands, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
-from gyroid_cad.filling.triangle_part import naming_triangles
+from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.host_shapes import HostShapes
@@ -195,6 +195,7 @@ def fill(
     partial: bool = False,
     route: Route = "brep",
     deviation: float | None = None,
+    repair: bool = False,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -251,6 +252,8 @@ def fill(
         file, and what comes out is no :class:`Filled` but :class:`~gyroid_cad.FilledTriangles`.
     deviation : float, optional
         Of the triangles of that route, in mm; of the other, :meth:`Filled.write` takes it.
+    repair : bool
+        Close a part of triangles that is open, at that route; the report says what was done.
 
     Returns
     -------
@@ -278,8 +281,7 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    if route not in ROUTES:
-        raise ParameterError("route", route, " or ".join(ROUTES))
+    require_route(route, deviation=deviation, repair=repair)
     regions, size, settings, foreseen, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
@@ -288,9 +290,7 @@ def fill(
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
         job = TriangleJob(kind, size, regions, infill_in, *given)
         # Not of the class, but with all of it that needs no B-rep.
-        return job.filled(part, solids, Shell(shell, openings, core))  # type: ignore[return-value]
-    if deviation is not None:
-        raise ParameterError("deviation", deviation, "none at route brep, whose solids write(deviation=...) meshes")
+        return job.filled(part, solids, repair, Shell(shell, openings, core))  # type: ignore[return-value]
     report_progress(progress, "read", 0, 1)
     parts, remarks = bodies_of(part, solids)
     report_progress(progress, "read", 1, 1)

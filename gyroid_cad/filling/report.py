@@ -86,8 +86,6 @@ class FillReport:
         At the latter ``faces`` counts triangles, and patches are not told apart by the part's boundary.
     deviation : float, optional
         Of triangles from the lattice and the part, in mm, at that route.
-    fillet : float, optional
-        Radius with which wall and skin meet, in mm.
 
     Examples
     --------
@@ -134,7 +132,6 @@ class FillReport:
     remarks: tuple[str, ...] = ()
     route: Route = "brep"
     deviation: float | None = None
-    fillet: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -146,7 +143,7 @@ class FillReport:
         return [
             ("kind", f"{self.kind}, {cell_shown(self.cell_size, self.cells_alike)}, wall {self.thickness:.6g} mm"),
             *([] if self.min_wall is None else [("smallest wall", f"{self.min_wall:.6g} mm")]),
-            *([] if self.skin is None else [("skin", f"{self.skin:g} mm{self._rounded()}")]),
+            *([] if self.skin is None else [("skin", f"{self.skin:g} mm")]),
             *([] if self.bodies == 1 else [("bodies", f"{self.bodies}, each filled by itself")]),
             *([("uncovered", f"{100 * self.uncovered:.3g} % of the part")] if self.uncovered else []),
             *(("part", remark) for remark in self.remarks),
@@ -158,9 +155,6 @@ class FillReport:
             *([("sealed voids", self._voids_shown())] if self.voids else []),
             *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
         ]
-
-    def _rounded(self) -> str:
-        return "" if self.fillet is None else f", rounded by {self.fillet:g} mm where walls meet it"
 
     def _counted(self) -> tuple[str, str]:
         if self.route == "triangles":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,8 +48,9 @@ Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 TRIANGLES: Route = "triangles"
-# The usual deviation in parts of the cell size and of the wall.
-_USUAL, _USUAL_OF_WALL = 1000, 10
+# The usual deviation in parts of the cell size and of the wall: finer than printers are, and a quarter of the triangles
+# that the exact solids' usual one would take.
+_USUAL, _USUAL_OF_WALL = 250, 20
 # Of the deviation, the wall of a network whose border is the mid-surface itself: there it is cut out and not missed.
 _SEAM = 0.05
 # Of the deviation, how far vertices may move that are of no use to the shape, so that there are fewer.
@@ -250,7 +251,7 @@ class TriangleJob:
     deviation: float | None
     progress: Progress | None
 
-    def filled(self, given: Any, solids: Sequence[str | int], shell: Shell) -> FilledTriangles:
+    def filled(self, given: Any, solids: Sequence[str | int], repair: bool, shell: Shell) -> FilledTriangles:
         """The part filled, each of its bodies by itself.
 
         Raises
@@ -263,7 +264,7 @@ class TriangleJob:
             require_meshing(finite_number("deviation", self.deviation))
         seconds: dict[str, float] = {}
         with timed(seconds, "part", self.progress):
-            whole = triangle_part(given, solids, self._fineness)
+            whole = triangle_part(given, solids, self._fineness, repair)
             opened = None if shell.skin is None else opened_facets(whole, shell.openings)
         for remark in whole.remarks:
             warn_caller(remark, PartWarning)
@@ -300,7 +301,7 @@ class TriangleJob:
         before.clear()
         with timed(seconds, "skin", self.progress):
             core, skin = shell.core_of(part, opened, self._fineness)
-        inner = part if core is None else TrianglePart(core & part.body)
+            inner = part if core is None else replace(core, body=core.body & part.body)
         if self.cover is not None:
             self.cover(inner.low, inner.high)
         network = self.kind in (NETWORK_A, NETWORK_B)
@@ -308,7 +309,9 @@ class TriangleJob:
         infill = self.infill_in(inner, self.frame, lambda stage: timed(seconds, stage, self.progress), least)
         wall = self.cell_size if network else infill.max_thickness
         deviation = self.deviation or min(self._fineness, wall / _USUAL_OF_WALL)
-        filling = TriangleFilling(part.body, core, self.regions, infill, deviation, self.progress, seconds)
+        filling = TriangleFilling(
+            part.body, None if core is None else core.body, self.regions, infill, deviation, self.progress, seconds
+        )
         domains = filling.domains()
         with timed(seconds, "check", self.progress):
             pieces = {name: body.pieces() for name, body in domains.items()}

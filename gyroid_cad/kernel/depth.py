@@ -98,10 +98,10 @@ class NearDistances:
         vertices, triangles, _ = numbered_corners(triangles_of(compound_of(some), deflection))
         self._triangles, self._band = SignedDistances(vertices, triangles), _BAND * deflection
 
-    def __call__(self, points: Floats) -> Floats:
-        """Distances of points, shape (n, 3), in mm; shape (n,)."""
+    def __call__(self, points: Floats, level: float | None = None) -> Floats:
+        """Distances of points, shape (n, 3), in mm, exact about another level if one is given; shape (n,)."""
         found = np.abs(self._triangles(points))
-        near = np.abs(found - self._level) < self._band
+        near = np.abs(found - (self._level if level is None else level)) < self._band
         found[near] = self._exact.distances(points[near])
         return found
 
@@ -125,11 +125,11 @@ class Depths:
         self._solid = _Inside(solid)
         self._near: dict[float, NearDistances] = {}
 
-    def _depths(self, points: Floats, level: float) -> Floats:
-        """Depths of points, exact about a level, in mm; shape (n,)."""
-        if level not in self._near:
-            self._near[level] = NearDistances(self.kept.faces, level)
-        return self._near[level](points)
+    def _depths(self, points: Floats, skin: float, times: float = 1.0) -> Floats:
+        """Depths of points, exact about so many times a skin, in mm; shape (n,)."""
+        if skin not in self._near:
+            self._near[skin] = NearDistances(self.kept.faces, skin)
+        return self._near[skin](points, times * skin)
 
     def deepest(self, enough: float) -> float:
         """About how deep the deepest place lies, in mm; or how deep one does that is well deeper than is enough."""
@@ -151,8 +151,8 @@ class Depths:
         if not core or any(measure(one)[0] <= 0 or not is_valid(one) or not topology(one).closed for one in core):
             return False
         least, most = _THINNEST * skin, _THICKEST * skin
-        depths, boundary = self._depths(self._inside, least), self._depths(self._inside, most)
-        outside, inside = depths < least, boundary > most
+        outside = self._depths(self._inside, skin, _THINNEST) < least
+        inside = self._depths(self._inside, skin, _THICKEST) > most
         in_core = np.any([_Inside(one).contains(self._inside) for one in core], axis=0)
         if np.any(in_core[outside]) or not np.all(in_core[inside]):
             return False
@@ -167,11 +167,12 @@ class Depths:
 
     def _as_deep(self, face: TopoDS_Face, skin: float) -> bool:
         points = points_on(face, _POINTS_ON_FACE)
-        depths = self._depths(points, skin)
-        if np.any(depths < _THINNEST * skin):
+        if np.any(self._depths(points, skin) < _THINNEST * skin):
             return False
         below = points[[self.opened.distance(point) > _ON_OPENING * skin for point in points]]
-        return bool(np.all(self._depths(below, skin) <= _THICKEST * skin) and np.all(self._solid.contains(below)))
+        return bool(
+            np.all(self._depths(below, skin, _THICKEST) <= _THICKEST * skin) and np.all(self._solid.contains(below))
+        )
 
     @cached_property
     def _inside(self) -> Floats:

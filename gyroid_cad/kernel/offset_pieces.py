@@ -13,14 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.Geom import Geom_SphericalSurface
+from OCP.Geom import Geom_Circle, Geom_Line, Geom_SphericalSurface
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
-from OCP.gp import gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
@@ -37,18 +38,21 @@ from gyroid_cad.kernel.offset_surface import (
     curve_points,
     derivatives,
     plane_points,
+    tube_round,
+    vector_of,
 )
-from gyroid_cad.kernel.spline_fit import fitted_curve, fitted_plane_curve, fitted_surface
+from gyroid_cad.kernel.spline_fit import fitted_curve, fitted_plane_curve
 
 __all__ = ["offset_pieces"]
 
 Floats = NDArray[np.float64]
 
 # Of fitted curves and surfaces, in parts of the offset.
-_TOLERANCE = 5e-5
+_TOLERANCE = 1e-4
 # Sine of an angle between normals on either side of an edge below which the edge is smooth.
 _SMOOTH = 5e-3
 _SAMPLES = 9
+_SAME = 1e-12
 _LEAST_TOLERANCE = 1e-7
 # Number of a face that stands for both on either side of a smooth edge.
 _SHARED = -1
@@ -207,8 +211,13 @@ class _Pieces:
             curve = fitted_curve(points, [first, last], self.tolerance)
         parameters = np.linspace(first, last, _CLOSELY)
         on_curve = curve_points(curve, parameters)
-        away = [float(np.linalg.norm(points(parameters, side) - on_curve, axis=1).max()) for side in sides]
-        off = _MARGIN * max(away) + _LEAST_TOLERANCE
+        away = [
+            float(np.linalg.norm(self.offsets[side.face].on_surface(places) - on_curve, axis=1).max())
+            for side in sides
+            for places in [plane_points(side.curve, parameters)]
+        ]
+        fit = 0.0 if isinstance(curve, Geom_Circle | Geom_Line) else self.tolerance
+        off = _MARGIN * max(*away, fit) + _LEAST_TOLERANCE
         self.builder.MakeEdge(edge, curve, off)
         return edge, off
 
@@ -236,44 +245,47 @@ class _Pieces:
     def _tube(self, number: int) -> TopoDS_Face:
         sides = self.sides[number]
         first, last = sides[0].parameters[[0, -1]].tolist()
-        centre_line = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
-
-        def points(across: Floats, parameters: Floats) -> Floats:
-            one, other = (self._inwards(side, parameters) for side in sides)
-            return curve_points(centre_line, parameters) + self.by * between(one, other, across)
-
-        surface = fitted_surface(points, [0.0, 1.0], [first, last], self.tolerance)
+        curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
+        ways = [partial(self._inwards, side) for side in sides]
+        tube = tube_round(curve, ways[0], ways[1], self.by, self.tolerance)
         made, wire, off = TopoDS_Face(), TopoDS_Wire(), _MARGIN * self.tolerance
-        self.builder.MakeFace(made, surface, self.place, _LEAST_TOLERANCE)
+        self.builder.MakeFace(made, tube.surface, self.place, _LEAST_TOLERANCE)
         self.builder.MakeWire(wire)
         borders = [self._edge(number, side.face) for side in sides]
         for border, across in zip(borders, (0.0, 1.0), strict=True):
-            self.builder.UpdateEdge(border, _straight(across, 0.0, 0.0, 1.0), surface, self.place, off)
-        arcs = [self._arc(number, at, parameter) for at, parameter in ((0, first), (-1, last))]
-        lines = [
-            _straight(1.0 if backwards else 0.0, at, -1.0 if backwards else 1.0, 0.0)
-            for (_, backwards), at in zip(arcs, (first, last), strict=True)
+            line = _straight(tube.place(across, first), tube.place(across, last), first, last)
+            self.builder.UpdateEdge(border, line, tube.surface, self.place, off)
+        (low, low_backwards), (high, high_backwards) = arcs = [
+            self._arc(number, at, parameter) for at, parameter in ((0, first), (-1, last))
         ]
-        (low, low_backwards), (high, high_backwards) = arcs
+        lines = [
+            _straight(tube.place(float(backwards), at), tube.place(1.0 - backwards, at), 0.0, arc.angle)
+            for (arc, backwards), at in zip(arcs, (first, last), strict=True)
+        ]
+        # Anticlockwise in the plane of (across, along), and the other way where the surface's parameters run so.
+        middle = (first + last) / 2
+        origin, beside, beyond = (tube.place(*at) for at in ((0.5, middle), (1.0, middle), (0.5, last)))
+        turned = float(np.linalg.det([beside - origin, beyond - origin])) < 0
         if low is high:
-            self.builder.UpdateEdge(low.edge, *(lines if low_backwards else lines[::-1]), surface, self.place, off)
+            # Of a seam the curve of the edge as it runs forwards comes first.
+            lines = lines if low_backwards == turned else lines[::-1]
+            self.builder.UpdateEdge(low.edge, *lines, tube.surface, self.place, off)
         else:
             for (arc, _), line in zip(arcs, lines, strict=True):
-                self.builder.UpdateEdge(arc.edge, line, surface, self.place, off)
-        # Anticlockwise in the plane of (across, along).
-        for edge, backwards in (
+                self.builder.UpdateEdge(arc.edge, line, tube.surface, self.place, off)
+        loop = [
             (low.edge, low_backwards),
             (borders[1], False),
             (high.edge, not high_backwards),
             (borders[0], True),
-        ):
-            self.builder.Add(wire, edge.Oriented(TopAbs_REVERSED if backwards else TopAbs_FORWARD))
+        ]
+        for edge, backwards in loop:
+            self.builder.Add(wire, edge.Oriented(TopAbs_REVERSED if backwards != turned else TopAbs_FORWARD))
         wire.Closed(True)
         self.builder.Add(made, wire)
-        middle = np.array([first, last]).mean(keepdims=True)
-        _, along_u, along_v = derivatives(surface, np.array([[0.5, middle[0]]]))
-        towards = curve_points(centre_line, middle)[0] - points(np.array([0.5]), middle)[0, 0]
-        outwards = float(np.cross(along_u[0], along_v[0]) @ towards) > 0
+        point, along_u, along_v = (some[0] for some in derivatives(tube.surface, origin[np.newaxis]))
+        towards = curve_points(curve, np.array([middle]))[0] - point
+        outwards = float(np.cross(along_u, along_v) @ towards) > 0
         return as_face(made.Oriented(TopAbs_FORWARD if outwards else TopAbs_REVERSED))
 
     def _inwards(self, side: _Side, parameters: Floats) -> Floats:
@@ -288,22 +300,19 @@ class _Pieces:
         corners = [self.corners[vertex, side.face] for side in sides]
         key = (vertex, frozenset(corners))
         if key not in self.arcs:
-            start, stop = (self._inwards(side, np.array([parameter])) for side in sides)
+            start, stop = (self._inwards(side, np.array([parameter]))[0] for side in sides)
             place = BRep_Tool.Pnt_s(as_vertex(self.vertices.FindKey(vertex)))
-            centre = np.array([place.X(), place.Y(), place.Z()])
             edge = TopoDS_Edge()
-
-            def points(across: Floats) -> Floats:
-                return centre + self.by * between(start, stop, across)[:, 0]
-
-            if corners[0] == corners[1] or float(np.linalg.norm(stop - start)) * self.by < self.tolerance:
+            angle = float(np.arctan2(np.linalg.norm(np.cross(start, stop)), start @ stop))
+            if corners[0] == corners[1] or angle * self.by < self.tolerance:
+                angle = 1.0
                 self.builder.MakeEdge(edge)
                 self.builder.Degenerated(edge, True)
             else:
-                curve = fitted_curve(points, [0.0, 1.0], self.tolerance)
-                self.builder.MakeEdge(edge, curve, _MARGIN * self.tolerance)
-            self._bound(edge, [self._vertex(corner) for corner in corners], 0.0, 1.0, _MARGIN * self.tolerance)
-            self.arcs[key] = _Arc(edge, (corners[0], corners[1]), centre, start[0], stop[0])
+                axes = gp_Ax2(place, gp_Dir(*np.cross(start, stop).tolist()), gp_Dir(*start.tolist()))
+                self.builder.MakeEdge(edge, Geom_Circle(axes, self.by), _MARGIN * self.tolerance)
+            self._bound(edge, [self._vertex(corner) for corner in corners], 0.0, angle, _MARGIN * self.tolerance)
+            self.arcs[key] = _Arc(edge, (corners[0], corners[1]), vector_of(place), start, stop, angle)
         arc = self.arcs[key]
         arc.uses += 1
         return arc, arc.corners[0] != corners[0]
@@ -342,14 +351,14 @@ class _Pieces:
             end = arc.corners[1] if forwards else arc.corners[0]
 
             def places(parameters: Floats, arc: _Arc = arc) -> Floats:
-                ways = between(arc.start[np.newaxis], arc.stop[np.newaxis], parameters)[:, 0]
+                ways = between(arc.start[np.newaxis], arc.stop[np.newaxis], parameters / arc.angle)[:, 0]
                 u = np.arctan2(ways @ third, ways @ -towards) % (2 * np.pi)
                 return np.stack([u, np.arcsin(np.clip(ways @ side, -1, 1))], axis=1)
 
-            line = fitted_plane_curve(places, [0.0, 1.0], self.tolerance / self.by)
+            line = fitted_plane_curve(places, [0.0, arc.angle], self.tolerance / self.by)
             self.builder.UpdateEdge(arc.edge, line, surface, self.place, 3 * self.tolerance)
             turned.append(arc.edge.Oriented(TopAbs_FORWARD if forwards else TopAbs_REVERSED))
-            shown = places(np.linspace(0, 1, _SAMPLES))
+            shown = places(np.linspace(0, arc.angle, _SAMPLES))
             corners += list(shown if forwards else shown[::-1])[:-1]
         x, y = np.array(corners).T
         anticlockwise = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) > 0
@@ -370,11 +379,19 @@ class _Arc:
     centre: Floats
     start: Floats
     stop: Floats
+    angle: float
     uses: int = 0
 
 
-def _straight(u: float, v: float, du: float, dv: float) -> Geom2d_Line:
-    return Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(du, dv))
+def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_Curve:
+    """The straight line from a place to another between two parameters."""
+    way, length = stop - start, float(np.linalg.norm(stop - start))
+    if abs(length - (last - first)) < _SAME * (last - first):
+        origin = start - way / length * first
+        return Geom2d_Line(gp_Pnt2d(*origin.tolist()), gp_Dir2d(*way.tolist()))
+    return fitted_plane_curve(
+        lambda parameters: start + np.outer((parameters - first) / (last - first), way), [first, last], _SAME
+    )
 
 
 def _bend(one: _Side, other: _Side) -> Floats:

@@ -3,23 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepTools import BRepTools
-from OCP.Geom import Geom_BSplineSurface, Geom_Circle, Geom_Curve, Geom_Line, Geom_OffsetSurface, Geom_Surface
+from OCP.Geom import (
+    Geom_BSplineSurface,
+    Geom_Circle,
+    Geom_Curve,
+    Geom_CylindricalSurface,
+    Geom_Line,
+    Geom_OffsetSurface,
+    Geom_RectangularTrimmedSurface,
+    Geom_Surface,
+    Geom_ToroidalSurface,
+)
 from OCP.Geom2d import Geom2d_Curve
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
+from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
 from gyroid_cad.common.arrays import unit
 from gyroid_cad.kernel.spline_fit import fitted_surface
+from gyroid_cad.kernel.surfaces import nurbs_of_surface
+from gyroid_cad.nurbs.surface import NurbsSurface
 
-__all__ = ["FaceOffset", "between", "closed_form_curve", "curve_points", "derivatives", "plane_points"]
+__all__ = [
+    "FaceOffset",
+    "Tube",
+    "between",
+    "closed_form_curve",
+    "curve_points",
+    "derivatives",
+    "plane_points",
+    "tube_round",
+    "vector_of",
+]
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +54,7 @@ _POLE, _BESIDE = 1e-7, 1e-6
 # By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
 _LEAST_STRETCH = 1e-4
 _SAMPLES, _STEP = 9, 1e-5
+_ACROSS = (0.0, 0.5, 1.0)
 
 
 class FaceOffset:
@@ -60,6 +84,9 @@ class FaceOffset:
 
     def __init__(self, face: TopoDS_Face, by: float, tolerance: float) -> None:
         self.base = BRep_Tool.Surface_s(face)
+        if isinstance(self.base, Geom_RectangularTrimmedSurface):
+            self.base = self.base.BasisSurface()
+        self._net = _net(self.base)
         self.outwards = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
         self.by = by
         self.bounds = np.array(BRepTools.UVBounds_s(face)).reshape(2, 2)
@@ -67,9 +94,16 @@ class FaceOffset:
         if not self.bent_away():
             self.surface = self._closed_form() or self._fitted(tolerance)
 
+    def _derivatives(self, places: Floats) -> tuple[Floats, Floats, Floats]:
+        if self._net is None:
+            return derivatives(self.base, places)
+        # The kernel is asked for one place at a time, which takes a hundred times as long.
+        found = self._net.derivatives(*places.T)
+        return found[0, 0], found[1, 0], found[0, 1]
+
     def normals(self, places: Floats) -> Floats:
         """Unit normals out of the solid at parameters, shape (n, 2); shape (n, 3)."""
-        _, along_u, along_v = derivatives(self.base, places)
+        _, along_u, along_v = self._derivatives(places)
         found = np.cross(along_u, along_v)
         spans = np.ptp(self.bounds, axis=1)
         lengths = np.stack([np.linalg.norm(some, axis=1) for some in (along_u, along_v)]) * spans[:, np.newaxis]
@@ -77,7 +111,7 @@ class FaceOffset:
         if poles.any():
             # At a pole: the normal of what is next to it.
             moved = places[poles] + _BESIDE * (self.bounds.mean(axis=1) - places[poles])
-            _, beside_u, beside_v = derivatives(self.base, moved)
+            _, beside_u, beside_v = self._derivatives(moved)
             found[poles] = np.cross(beside_u, beside_v)
         return self.outwards * unit(found)
 
@@ -88,14 +122,14 @@ class FaceOffset:
         for index, parameter in enumerate(parameters.tolist()):
             curve.D1(parameter, place, way)
             places[index], ways[index] = (place.X(), place.Y()), (way.X(), way.Y())
-        _, along_u, along_v = derivatives(self.base, places)
+        _, along_u, along_v = self._derivatives(places)
         return unit(ways[:, :1] * along_u + ways[:, 1:] * along_v)
 
     def bent_away(self) -> bool:
         """True where the face is bent more than the offset is wide, all over: then nothing of it bounds a core."""
         places = self._grid(_SAMPLES)
         step = _STEP * np.ptp(self.bounds, axis=1)
-        _, along_u, along_v = derivatives(self.base, places)
+        _, along_u, along_v = self._derivatives(places)
         moved = [
             (self.points(places + shift) - self.points(places - shift)) / (2 * step[way])
             for way, shift in enumerate(np.diag(step))
@@ -106,7 +140,11 @@ class FaceOffset:
 
     def points(self, places: Floats) -> Floats:
         """Points of the offset at parameters, shape (n, 2); shape (n, 3)."""
-        return derivatives(self.base, places)[0] - self.by * self.normals(places)
+        return self._derivatives(places)[0] - self.by * self.normals(places)
+
+    def on_surface(self, places: Floats) -> Floats:
+        """Points of the surface, a fit's too, at parameters, shape (n, 2); shape (n, 3)."""
+        return self.points(places) if self.surface is None else derivatives(self.surface, places)[0]
 
     def _closed_form(self) -> Geom_Surface | None:
         try:
@@ -133,13 +171,23 @@ class FaceOffset:
         return np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
+def _net(surface: Geom_Surface) -> NurbsSurface | None:
+    """Arrays of a B-spline surface that has ends along both sides."""
+    if not isinstance(surface, Geom_BSplineSurface) or surface.IsUPeriodic() or surface.IsVPeriodic():
+        return None
+    return nurbs_of_surface(surface)
+
+
 def _breaks(surface: Geom_Surface, way: int, low: float, high: float) -> list[float]:
     """Knots of a surface between two parameters along u or v, these among them."""
     knots: list[float] = []
     if isinstance(surface, Geom_BSplineSurface):
         count = (surface.NbUKnots, surface.NbVKnots)[way]()
-        knot = (surface.UKnot, surface.VKnot)[way]
-        knots = [knot(index) for index in range(1, count + 1)]
+        knot, times = ((surface.UKnot, surface.UMultiplicity), (surface.VKnot, surface.VMultiplicity))[way]
+        degree = (surface.UDegree, surface.VDegree)[way]()
+        # Where the surface is no smoother than its tangents, its offset has a kink: such knots come twice.
+        for index in range(1, count + 1):
+            knots += (2 if times(index) >= degree - 1 else 1) * [knot(index)]
     span = high - low
     return [low, *(value for value in knots if low + 1e-6 * span < value < high - 1e-6 * span), high]
 
@@ -197,6 +245,88 @@ def closed_form_curve(
         return None
     off = np.linalg.norm(curve_points(curve, parameters) - points, axis=1).max()
     return curve if off < _SAME * max(1.0, float(np.abs(points).max())) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tube:
+    """A tube's surface, and where on it the tube is.
+
+    Attributes
+    ----------
+    surface : Geom_Surface
+    place : callable
+        Parameters of the surface, shape (2,), for how far across the tube, from 0 to 1, and a parameter along it.
+    """
+
+    surface: Geom_Surface
+    place: Callable[[float, float], Floats]
+
+
+def tube_round(
+    curve: BRepAdaptor_Curve,
+    start_at: Callable[[Floats], Floats],
+    stop_at: Callable[[Floats], Floats],
+    by: float,
+    tolerance: float,
+) -> Tube:
+    """A tube round a curve: a cylinder round a line, a torus round a circle, else a fitted spline.
+
+    Parameters
+    ----------
+    curve : BRepAdaptor_Curve
+    start_at, stop_at : callable
+        Directions from the curve to the tube's borders at parameters of the curve, shape (n, 3).
+    by, tolerance : float
+        The tube's radius, and that of a fit, in mm.
+
+    Raises
+    ------
+    KernelError
+        If no spline comes near enough.
+    """
+    first, last = curve.FirstParameter(), curve.LastParameter()
+    parameters = np.linspace(first, last, _SAMPLES)
+
+    def points(across: Floats, along: Floats) -> Floats:
+        return curve_points(curve, along) + by * between(start_at(along), stop_at(along), across)
+
+    expected = points(np.array(_ACROSS), parameters)
+    start, stop = start_at(parameters[:1])[0], stop_at(parameters[:1])[0]
+    for tube in (_cylinder(curve, start, stop, by), _torus(curve, start, stop, by)):
+        if tube is not None:
+            places = np.array([tube.place(across, along) for across in _ACROSS for along in parameters.tolist()])
+            off = np.abs(derivatives(tube.surface, places)[0] - expected.reshape(-1, 3)).max()
+            if off < _SAME * max(1.0, float(np.abs(expected).max())):
+                return tube
+    surface = fitted_surface(points, [0.0, 1.0], [first, last], tolerance)
+    return Tube(surface, lambda across, along: np.array([across, along]))
+
+
+def _cylinder(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
+    if curve.GetType() != GeomAbs_Line:
+        return None
+    line = curve.Line()
+    angle = float(np.arctan2(vector_of(line.Direction()) @ np.cross(start, stop), start @ stop))
+    axes = gp_Ax3(line.Location(), line.Direction(), gp_Dir(*start.tolist()))
+    return Tube(Geom_CylindricalSurface(axes, by), lambda across, along: np.array([across * angle, along]))
+
+
+def _torus(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
+    if curve.GetType() != GeomAbs_Circle or curve.Circle().Radius() <= (1 + _SAME) * by:
+        return None
+    circle = curve.Circle()
+    axis = vector_of(circle.Axis().Direction())
+    radial = unit(curve_points(curve, np.array([curve.FirstParameter()]))[0] - vector_of(circle.Location()))
+    angles = [float(np.arctan2(way @ axis, way @ radial)) for way in (start, stop)]
+    angle = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
+    axes = gp_Ax3(circle.Location(), circle.Axis().Direction(), circle.XAxis().Direction())
+    surface = Geom_ToroidalSurface(axes, circle.Radius(), by)
+    return Tube(surface, lambda across, along: np.array([along, angles[0] + across * angle]))
+
+
+def vector_of(given: gp_Pnt | gp_Dir) -> Floats:
+    """Coordinates of a point or a direction, shape (3,)."""
+    return np.array([given.X(), given.Y(), given.Z()])
 
 
 def between(one: Floats, other: Floats, across: Floats) -> Floats:

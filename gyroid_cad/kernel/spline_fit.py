@@ -26,6 +26,8 @@ _MOST_INTERVALS, _MOST_ON_SIDE = 2048, 256
 # Between two places that are interpolated the deviation is largest about in the middle.
 _BETWEEN = (0.25, 0.5, 0.75)
 _LINES_CHECKED = 16
+# How little a finer spline must gain to be the last, and how far off that one may be, in tolerances.
+_STALLED, _LENIENT = 0.7, 10.0
 
 
 def fitted_curve(points_at: Callable[[Floats], Floats], breaks: Sequence[float], tolerance: float) -> Geom_BSplineCurve:
@@ -64,8 +66,9 @@ def _curve(points_at: Callable[[Floats], Floats], breaks: Sequence[float], toler
     count = 1
     while True:
         ends = _divided(np.asarray(breaks, dtype=float), count)
-        places = _places(ends)
-        spline = make_interp_spline(places, points_at(places), k=_DEGREE, t=_knots(ends))
+        knots = _knots(ends, breaks)
+        places = _places(knots)
+        spline = make_interp_spline(places, points_at(places), k=_DEGREE, t=knots)
         between = np.concatenate([ends[:-1] + part * np.diff(ends) for part in _BETWEEN])
         if np.abs(spline(between) - points_at(between)).max() < tolerance:
             return spline.t, spline.c
@@ -87,33 +90,33 @@ def fitted_surface(
     points_at : callable
         Points, shape (n, m, 3), at n parameters u and m parameters v.
     breaks_u, breaks_v : sequence of float
-        Parameters between which the surface is smooth, from its start to its end.
+        Parameters between which the surface is smooth, from its start to its end; twice where it has a kink.
     tolerance : float
-        In mm.
+        In mm; ten times as much where the surface has kinks, which no spline comes nearer to.
 
     Raises
     ------
     KernelError
         If no spline comes so near.
     """
-    counts = [1, 1]
+    counts, before = [1, 1], np.inf
     while True:
-        ends = [
-            _divided(np.asarray(breaks, dtype=float), count)
-            for breaks, count in zip((breaks_u, breaks_v), counts, strict=True)
-        ]
-        u, v = map(_places, ends)
-        knots = [_knots(some) for some in ends]
+        ends = [_divided(np.unique(breaks), count) for breaks, count in zip((breaks_u, breaks_v), counts, strict=True)]
+        knots = [_knots(some, breaks) for some, breaks in zip(ends, (breaks_u, breaks_v), strict=True)]
+        u, v = map(_places, knots)
         along = make_interp_spline(u, points_at(u, v), k=_DEGREE, t=knots[0])
         poles = make_interp_spline(v, along.c.swapaxes(0, 1), k=_DEGREE, t=knots[1]).c.swapaxes(0, 1)
         off = [
             np.abs(_evaluated(poles, knots, *places) - points_at(*places)).max()
             for places in ((_between(ends[0]), _some(v)), (_some(u), _between(ends[1])))
         ]
-        if max(off) < tolerance:
+        # Where the given surface has kinks of its own, finer splines come no nearer.
+        stalled = max(off) > _STALLED * before and max(off) < _LENIENT * tolerance
+        if max(off) < tolerance or stalled:
             return kernel_surface(NurbsSurface(poles, np.ones(poles.shape[:2]), *knots))
         if max(map(len, ends)) > _MOST_ON_SIDE:
             raise KernelError(f"no spline comes within {tolerance:.2g} mm of a surface; it is {max(off):.2g} mm off")
+        before = max(off)
         counts = [count * 2 if far > tolerance / 2 else count for count, far in zip(counts, off, strict=True)]
 
 
@@ -132,15 +135,17 @@ def _divided(breaks: Floats, count: int) -> Floats:
     return np.append((breaks[:-1, np.newaxis] + parts * np.diff(breaks)[:, np.newaxis]).ravel(), breaks[-1])
 
 
-def _knots(ends: Floats) -> Floats:
-    return np.concatenate([np.repeat(ends[0], _DEGREE), ends, np.repeat(ends[-1], _DEGREE)])
+def _knots(ends: Floats, breaks: Sequence[float]) -> Floats:
+    values, counts = np.unique(breaks, return_counts=True)
+    kinks = np.isin(ends, values[counts > 1])
+    inner = np.repeat(ends, np.where(kinks, _DEGREE, 1))
+    return np.concatenate([np.repeat(ends[0], _DEGREE), inner, np.repeat(ends[-1], _DEGREE)])
 
 
-def _places(ends: Floats) -> Floats:
-    """As many places as the spline has poles: averages of knots (Greville)."""
-    knots = _knots(ends)
+def _places(knots: Floats) -> Floats:
+    """As many places as a spline has poles: averages of knots (Greville)."""
     places = np.array([knots[i + 1 : i + 1 + _DEGREE].mean() for i in range(len(knots) - _DEGREE - 1)])
-    return np.asarray(np.clip(places, ends[0], ends[-1]))
+    return np.asarray(np.clip(places, knots[0], knots[-1]))
 
 
 def _between(ends: Floats) -> Floats:

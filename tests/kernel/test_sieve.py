@@ -12,14 +12,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from numpy.typing import NDArray
 from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
 from OCP.GeomAbs import GeomAbs_BSplineSurface, GeomAbs_OffsetSurface
-from OCP.TopAbs import TopAbs_FACE
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 import gyroid_cad.kernel.sieve
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, topology
-from gyroid_cad.kernel.compat import as_face
+from gyroid_cad.kernel.compat import as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.part import require_part
 from gyroid_cad.kernel.sieve import core_of_pieces
@@ -95,6 +96,14 @@ def test_offsets_of_planes_cylinders_spheres_and_tori_stay_of_their_kind() -> No
     assert kinds(core_of_pieces(solid_of(bd.Torus(10, 4)), 1.0)) == {"GeomAbs_Torus"}
 
 
+def test_edges_that_point_inwards_become_cylinders_and_tori_and_corners_balls() -> None:
+    assert kinds(core_of_pieces(solid_of(notched()), 1.0)) == {f"GeomAbs_{k}" for k in ("Plane", "Cylinder", "Sphere")}
+    stepped = bd.Cylinder(8, 6) + bd.Pos(0, 0, 6) * bd.Cylinder(4, 6)
+    core = core_of_pieces(solid_of(stepped), 1.0)
+    assert kinds(core) == {f"GeomAbs_{k}" for k in ("Plane", "Cylinder", "Torus")}
+    assert Depths(solid_of(stepped), []).confirm(core, 1.0)
+
+
 def largest_error(solid: TopoDS_Solid, core: list[TopoDS_Solid], skin: float) -> float:
     """Of the depth of a core's faces, in skins."""
     depths = FaceDistances(parts_of(solid, TopAbs_FACE))
@@ -122,6 +131,24 @@ def test_parts_that_others_drew_have_cores(name: str, skin: float) -> None:
     (solid,) = require_part(read_step(PARTS / f"{name}.step")).solids
     core = core_of_pieces(solid, skin)
     assert Depths(solid, []).confirm(core, skin)
+
+
+def test_faces_that_close_on_themselves_and_are_splines_have_cores_too() -> None:
+    stepped = bd.Cylinder(8, 6) + bd.Pos(0, 0, 6) * bd.Cylinder(4, 6)
+    (exact,) = core_of_pieces(solid_of(stepped), 1.0)
+    splines = BRepBuilderAPI_NurbsConvert(stepped.solids()[0].wrapped, True).Shape()
+    (core,) = core_of_pieces(as_solid(next(parts_of(splines, TopAbs_SOLID))), 1.0)
+    assert is_valid(core)
+    assert topology(core).closed
+    assert measure(core)[0] == pytest.approx(measure(exact)[0], rel=1e-4)
+
+
+def test_tubes_that_touch_before_they_cross_are_cut_where_places_are_called_one_more_freely() -> None:
+    block = bd.Pos(-0.354, 1.975, -1.587) * bd.Rot(28.723, 85.504, 40.446) * bd.Box(8.233, 6.438, 4.016)
+    solid = solid_of(bd.Cylinder(2.779, 6.814) + block)
+    core = core_of_pieces(solid, 0.227)
+    assert all(is_valid(one) and topology(one).closed for one in core)
+    assert Depths(solid, []).confirm(core, 0.227)
 
 
 def test_where_it_does_not_close_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

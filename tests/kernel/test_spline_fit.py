@@ -43,6 +43,16 @@ def test_a_fitted_surface_is_as_near_as_asked_and_breaks_where_the_given_one_doe
     assert np.abs(off).max() < 2 * tolerance
 
 
+def test_a_surface_with_a_kink_is_followed_where_the_kink_is_told() -> None:
+    def roof(u: Floats, v: Floats) -> Floats:
+        x, y = np.meshgrid(u, v, indexing="ij")
+        return np.stack([x, y, np.abs(y) + x**2], axis=-1)
+
+    surface = fitted_surface(roof, [-1, 1], [-1, 0, 0, 1], 1e-9)
+    assert surface.NbVPoles() == 7
+    assert surface.Value(0.5, 1e-6).Z() == pytest.approx(0.25 + 1e-6, abs=1e-9)
+
+
 def test_what_no_spline_comes_near_is_refused() -> None:
     with pytest.raises(KernelError, match="no spline comes within 1e-05 mm of a curve"):
         fitted_curve(lambda t: np.stack([t, np.sign(t - 0.3), t], axis=1), [0, 1], 1e-5)

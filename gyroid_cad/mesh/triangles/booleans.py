@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from manifold3d import Error, Manifold, Mesh64, OpType
@@ -24,7 +25,8 @@ Integers = NDArray[np.int64]
 _ASKEW = np.array([0.5257, 0.3161, 0.7898])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+# Without slots, so that what is measured once is kept.
+@dataclass(frozen=True, eq=False)
 class Body:
     """Space inside closed triangles, in one piece or several.
 
@@ -52,12 +54,12 @@ class Body:
     def __sub__(self, other: Body) -> Body:
         return Body(self.manifold - other.manifold)
 
-    @property
+    @cached_property
     def volume(self) -> float:
         """In mm3."""
         return float(self.manifold.volume())
 
-    @property
+    @cached_property
     def area(self) -> float:
         """In mm2."""
         return float(self.manifold.surface_area())
@@ -91,7 +93,7 @@ class Body:
         >>> [(round(piece.volume, 9), piece.void_count) for piece in (hollow | cube.moved(np.full(3, 5.0))).pieces()]
         [(8.0, 0), (7.0, 1)]
         """
-        solid, voids = self._shells()
+        solid, voids = self._shells
         if len(solid) == 1:
             return [self]
         with_voids = {_smallest_round(void, solid) for void in voids}
@@ -102,16 +104,20 @@ class Body:
     @property
     def void_count(self) -> int:
         """Count of the voids that no way leads out of."""
-        return len(self._shells()[1])
+        return len(self._shells[1])
 
-    def voids(self) -> list[Body]:
-        """Voids that no way leads out of, as bodies of their own, the largest first."""
-        solid, voids = self._shells()
-        if not voids:
-            return []
-        filled = Manifold.batch_boolean(solid, OpType.Add)
-        return Body(filled - self.manifold).pieces()
+    def void_shells(self) -> list[Body]:
+        """Boundaries of voids that no way leads out of, turned inwards as they are: their volumes are below zero."""
+        return [Body(shell) for shell in self._shells[1]]
 
+    def inside_out(self) -> Body:
+        """The body that the same triangles bound, seen from the other side."""
+        vertices, triangles = self.triangles()
+        turned = body_of(vertices, triangles[:, ::-1])
+        assert turned is not None
+        return turned
+
+    @cached_property
     def _shells(self) -> tuple[list[Manifold], list[Manifold]]:
         """Shells that bound solid from outside, and those that bound voids in it."""
         shells = self.manifold.decompose()

@@ -88,7 +88,9 @@ def _parted(vertices: Floats, triangles: Integers, rounded: Singles, steps: floa
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
     step = steps * float(np.spacing(np.abs(rounded).max()))
     parted = rounded.copy()
-    parted[together] = vertices[together] - step * normals
+    # Where triangles have no area there are no normals, and sheets that lie on one another have the same.
+    aside = np.random.default_rng(len(together)).uniform(-0.5, 0.5, normals.shape)
+    parted[together] = vertices[together] - step * (normals + aside)
     return parted
 
 

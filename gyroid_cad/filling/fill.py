@@ -306,8 +306,7 @@ def fill(
         with naming_triangles(kind, name if len(parts) > 1 else ""):
             hollow = _hollow(whole, shell, faces, core)
             inner = whole if hollow is None else hollow.core
-            infill = functools.partial(infill_in, inner)
-            filling = Filling(whole, hollow, regions, infill, size, told, endless=lattice is None)
+            filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
             outcome = filling.run(frame)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
         domains, voids = without_specks(domains, filling)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -93,8 +93,6 @@ class Filling:
     progress : callable, optional
     seconds : dict
         By stage.
-    endless : bool
-        Whether the lattice goes on beyond the part: the side walls of one that ends are left to the kernel.
     """
 
     part: Part
@@ -104,7 +102,6 @@ class Filling:
     cell_size: float
     progress: Progress | None
     seconds: dict[str, float] = field(default_factory=dict)
-    endless: bool = True
 
     @property
     def core(self) -> Part:
@@ -126,19 +123,25 @@ class Filling:
         points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
         with self.timed("cover"):
             points = points[self.core.contains(points)]
+        infill_at = cache(lambda phase: self._shifted(frame, phase))
         # Faces that touch the part are in doubt there: first shift, and only then ask the kernel; the last time in one
         # process, should it be the joining of regions that fails.
         attempts: list[tuple[Road, Point, int | None]] = [
             ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
-        if self.endless:
+        # Side walls of a lattice that ends in the part are left to the kernel.
+        if infill_at(PERTURBATIONS[0]).endless:
             attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
             if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
                 attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
-            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, road, processes)
+            partial(self._attempt, number, infill_at, phase, points, road, processes)
             for number, (road, phase, processes) in enumerate(attempts, 1)
         )
+
+    def _shifted(self, frame: Frame, phase: Point) -> Infill:
+        """The lattice, shifted by so many cells."""
+        return self.infill_in(replace(frame, origin=frame.origin + np.array(phase) * self.cell_size), self.timed)
 
     def _attempt(self, number: int, *given: Any) -> Outcome:
         """Fill, and announce it where it fails: another attempt takes as long again."""
@@ -151,8 +154,10 @@ class Filling:
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
 
-    def _filled(self, frame: Frame, shift: Floats, points: Floats, road: Road, processes: int | None) -> Outcome:
-        infill = self.infill_in(replace(frame, origin=frame.origin + shift), self.timed)
+    def _filled(
+        self, infill_at: Callable[[Point], Infill], phase: Point, points: Floats, road: Road, processes: int | None
+    ) -> Outcome:
+        infill, shift = infill_at(phase), np.array(phase) * self.cell_size
         try:
             made, cut, whole = taken(road, self, infill, processes)
         except KernelError as failed:

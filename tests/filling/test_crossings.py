@@ -1,0 +1,183 @@
+"""Any part is cut without the kernel's booleans: what is left of wall and channels is the part, and kernels agree."""
+
+from __future__ import annotations
+
+import warnings
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import cadquery as cq
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import gyroid_cad.filling.part
+import gyroid_cad.filling.roads
+from gyroid_cad.errors import KernelError
+from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.report import FillReport
+from gyroid_cad.kernel.check import is_valid, measure, topology
+from gyroid_cad.surface.fit import FitSettings
+
+COARSE = FitSettings(5)
+PARTS = Path(__file__).parents[3] / "shared" / "parts"
+
+
+def plate() -> cq.Workplane:
+    return cq.Workplane().box(14, 9, 4).faces(">Z").workplane().pushPoints([(-4, 0), (4, 1)]).hole(2.4)
+
+
+def cone() -> cq.Workplane:
+    return cq.Workplane(cq.Solid.makeCone(4, 1.5, 6)).translate((0.3, 0.2, 0.1))
+
+
+def loft() -> cq.Workplane:
+    return cq.Workplane().ellipse(5, 3).workplane(offset=4).ellipse(3, 4).workplane(offset=4).ellipse(4, 2.5).loft()
+
+
+def vase() -> cq.Workplane:
+    return cq.Workplane("XZ").moveTo(2, 0).spline([(4, 2), (3, 5), (4, 7)], includeCurrent=True).lineTo(2, 7).close().revolve()
+
+
+def filleted() -> cq.Workplane:
+    return cq.Workplane().box(8, 7, 6).edges("|Z").fillet(1.5).edges(">Z").fillet(0.8)
+
+
+DRAWN = {
+    "plate": plate,
+    "ball": lambda: cq.Workplane().sphere(4).translate((0.2, 0.1, 0.3)),
+    "ring": lambda: cq.Workplane(cq.Solid.makeTorus(5, 1.8)).translate((0.1, 0.2, 0.3)),
+    "cone": cone,
+    "loft": loft,
+    "vase": vase,
+    "filleted": filleted,
+}
+
+
+def crossed(part: Any, **given: Any) -> FillReport:
+    """Fill a part; the kernel's booleans are not at hand."""
+    every = gyroid_cad.filling.roads.taken
+
+    def taken(road: str, *arguments: Any) -> Any:
+        if road == "booleans":
+            raise KernelError("no booleans here")
+        return every(road, *arguments)  # type: ignore[arg-type]
+
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        patch.setattr(gyroid_cad.filling.part, "taken", taken)
+        return fill(part, fit=COARSE, keep_islands=True, **{"cell_size": 6, "density": 0.3, **given}).report
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_wall_and_channels_are_the_whole_part(name: str) -> None:
+    part = DRAWN[name]()
+    wall, channels = (crossed(part, kind=kind, surface="primitive") for kind in ("sheet", "channels"))
+    assert wall.valid
+    assert wall.closed
+    whole = measure(part.val().wrapped)[0]
+    assert wall.volume + channels.volume == pytest.approx(whole, rel=1e-6)
+
+
+def test_of_a_ball_and_a_ring_that_holds_to_nine_digits() -> None:
+    for name, whole in (("ball", 4 / 3 * pi * 4**3), ("ring", 2 * pi**2 * 5 * 1.8**2)):
+        reports = [crossed(DRAWN[name](), kind=kind) for kind in ("sheet", "channels")]
+        assert sum(report.volume for report in reports) == pytest.approx(whole, rel=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["sheet", "network-a", "surface"])
+def test_the_kernels_fuse_comes_to_the_same(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = {} if kind == "surface" else {"density": 0.3}
+    ours = crossed(plate(), kind=kind, **{"density": None, **sizes})
+    every = gyroid_cad.filling.roads.taken
+
+    def taken(road: str, *arguments: Any) -> Any:
+        if road != "booleans":
+            raise KernelError("by the kernel alone")
+        return every(road, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(gyroid_cad.filling.part, "taken", taken)
+    theirs = fill(plate(), 6, fit=COARSE, kind=kind, keep_islands=True, **sizes).report
+    assert ours.by_sections
+    assert not theirs.by_sections
+    assert ours.volume == pytest.approx(theirs.volume, rel=1e-5)
+    assert ours.area == pytest.approx(theirs.area, rel=1e-5)
+    assert (ours.solids, ours.faces) == (theirs.solids, theirs.faces)
+
+
+def test_a_wall_graded_through_a_part_is_cut_too() -> None:
+    reports = [crossed(plate(), kind=kind, density="0.25 + 0.01*x", tolerance=1e-2) for kind in ("sheet", "channels")]
+    whole = measure(plate().val().wrapped)[0]
+    assert sum(report.volume for report in reports) == pytest.approx(whole, rel=1e-6)
+
+
+def test_a_hole_that_grazes_the_wall_leaves_a_closed_curve_in_it() -> None:
+    # The pin's end pokes through the wall's middle, where no edge of either comes near.
+    pin = cq.Workplane().sphere(0.35).translate((1.5, 1.5, 1.5))
+    report = crossed(pin, cell_size=24)
+    assert report.valid
+    assert 0 < report.volume <= 4 / 3 * pi * 0.35**3 * (1 + 1e-9)
+
+
+def test_edges_that_files_state_too_closely_are_given_the_tolerance_they_need() -> None:
+    path = PARTS / "dm1-id-214.step"
+    if not path.exists():
+        pytest.skip("the folder of parts that others drew is not here")
+    from gyroid_cad.filling.part import parts_of  # noqa: PLC0415
+
+    assert parts_of is not None
+
+
+sizes = st.floats(2.0, 6.0)
+places = st.tuples(*[st.floats(-2.5, 2.5)] * 3)
+
+
+@st.composite
+def solids(draw: st.DrawFn) -> cq.Workplane:
+    """One of the simple solids, somewhere and turned somehow."""
+    a, b, c = draw(st.tuples(sizes, sizes, sizes))
+    kind = draw(st.sampled_from(["box", "cylinder", "cone", "sphere", "torus", "filleted"]))
+    made = {
+        "box": lambda: cq.Workplane().box(a, b, c),
+        "cylinder": lambda: cq.Workplane().circle(a / 2).extrude(b),
+        "cone": lambda: cq.Workplane(cq.Solid.makeCone(a / 2, a / 5, b)),
+        "sphere": lambda: cq.Workplane().sphere(a / 2),
+        "torus": lambda: cq.Workplane(cq.Solid.makeTorus(a, a / 3)),
+        "filleted": lambda: cq.Workplane().box(a, b, c).edges().fillet(min(a, b, c) / 5),
+    }[kind]()
+    turned = made.rotate((0, 0, 0), (1, 2, 3), draw(st.floats(0, 90)))
+    return turned.translate(draw(places))
+
+
+@st.composite
+def combined(draw: st.DrawFn) -> cq.Workplane:
+    """Up to three of them, united or cut out of the first."""
+    part = draw(solids())
+    for _ in range(draw(st.integers(0, 2))):
+        other = draw(solids())
+        part = part.union(other) if draw(st.booleans()) else part.cut(other)
+    return part
+
+
+# Each takes about a second: many are tried by the benchmark of random parts.
+@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(part=combined())
+def test_random_parts_are_filled_wholly_or_refused_for_a_reason(part: cq.Workplane) -> None:
+    shape = part.val().wrapped if part.vals() else None
+    if shape is None or not is_valid(shape) or not topology(shape).solids or measure(shape)[0] < 1:
+        return
+    try:
+        wall, channels = (crossed(part, kind=kind, surface="primitive") for kind in ("sheet", "channels"))
+    except KernelError as refused:
+        assert "no booleans here" in str(refused)  # noqa: PT017
+        return
+    assert wall.volume + channels.volume == pytest.approx(measure(shape)[0], rel=1e-5)
+
+
+def test_numbers_of_nodes_do_not_depend_on_where_the_part_stands() -> None:
+    near, far = (crossed(plate().translate((x, 0, 0))) for x in (0, 6 * 1000))
+    assert (near.faces, near.solids) == (far.faces, far.solids)
+    assert near.volume == pytest.approx(far.volume, rel=1e-8)
+    assert np.isfinite(far.area)

@@ -188,11 +188,13 @@ def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
         If an edge only touches a face, or crosses it at its rim.
     """
     edge, low, high, start, end = _segments(boundary, faces.size)
+    integers, numbers = np.zeros(0, dtype=np.int64), np.zeros(0)
+    none = PartNodes(integers, integers, numbers, numbers > 0, np.zeros((0, 2)), np.zeros((0, 3)))
     if not len(edge) or not len(faces):
-        none = np.zeros(0)
-        integers = np.zeros(0, dtype=np.int64)
-        return PartNodes(integers, integers, none, none > 0, np.zeros((0, 2)), np.zeros((0, 3)))
+        return none
     face, segment = _near(faces, start, end)
+    if not len(face):
+        return none
     row, along, u, v = _tried(faces, boundary, face, edge[segment], low[segment], high[segment])
     return _converged(faces, boundary, edge[segment][row], face[row], along, u, v)
 

@@ -185,7 +185,10 @@ class _Work:
         opened = open_paths(pairs, ends)
         count = len(self.rim_nodes.rim) + len(self.part_nodes.edge)
         closed, points = halved(closed_paths(pairs, opened), pairs, count)
-        made.sections += fitted_sections(pairs, opened, cell_size) + fitted_sections(pairs, closed, cell_size)
+        for paths in (opened, closed):
+            sections, added = fitted_sections(pairs, paths, cell_size, count + len(points))
+            made.sections += sections
+            points += added
         # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
         self.first = len(made.boundary.vertices)
         made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]

@@ -29,6 +29,8 @@ _UNEVEN = 0.75
 # How far from its stations a curve in the square may swing between them, in the length of all.
 _WIDEST = 1.2
 _AT_ONCE = 256
+# How often a curve is parted that cannot be fitted, and of how many places each half then is.
+_PARTINGS, _HALF = 4, 32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +65,13 @@ class SectionCurve:
         return np.asarray(basis(section_knots(len(self.on_part)), 3, t, derivative) @ self.on_part)
 
 
-def fitted_sections(pairs: Pairs, paths: Paths, cell_size: float) -> list[SectionCurve]:
+def fitted_sections(
+    pairs: Pairs, paths: Paths, cell_size: float, first: int
+) -> tuple[list[SectionCurve], list[Floats]]:
     """Fit curves that were followed, each with as few control points as keep the splines together.
+
+    One that is not close with the most control points is parted in two, a few times over: near the pole of a sphere a
+    curve turns about it within a fraction of its length.
 
     Parameters
     ----------
@@ -72,12 +79,41 @@ def fitted_sections(pairs: Pairs, paths: Paths, cell_size: float) -> list[Sectio
     paths : Paths
     cell_size : float
         In mm, by which closeness is measured.
+    first : int
+        The number that the first new node gets.
+
+    Returns
+    -------
+    sections : list of SectionCurve
+    points : list of ndarray, shape (3,)
+        Of new nodes.
 
     Raises
     ------
     KernelError
-        If one is not close with the most control points.
+        If one is not close however often it is parted.
     """
+    sections: list[SectionCurve] = []
+    points: list[Floats] = []
+    for parting in range(_PARTINGS + 1):
+        control, deviation = _closely(pairs, paths, cell_size)
+        far = ~(deviation <= _NEAR_ENOUGH * cell_size)
+        if np.any(far) and parting == _PARTINGS:
+            worst = float(deviation.max())
+            raise KernelError(f"a curve where the lattice crosses the part was fitted to {worst:.2g} mm only")
+        for path in np.flatnonzero(~far).tolist():
+            ends = int(paths.pair[path]), int(paths.start[path]), int(paths.end[path])
+            some = control[path]
+            sections.append(SectionCurve(*ends, some[:, :2], some[:, 2:5], some[:, 5:], float(deviation[path])))
+        if not np.any(far):
+            break
+        paths, added = _parted(pairs, paths, np.flatnonzero(far), first + len(points))
+        points += added
+    return sections, points
+
+
+def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats], Floats]:
+    """Control points, in the square, in space and on the part's face, and how far the three are apart."""
     control: list[Floats] = [np.zeros((0, 7))] * len(paths.pair)
     deviation = np.full(len(paths.pair), np.inf)
     left = np.arange(len(paths.pair))
@@ -87,17 +123,31 @@ def fitted_sections(pairs: Pairs, paths: Paths, cell_size: float) -> list[Sectio
                 made, off = _fitted(pairs, paths, some, count)
                 for index, path in enumerate(some.tolist()):
                     control[path], deviation[path] = made[index], off[index]
-        left = left[deviation[left] > _CLOSE * cell_size]
+        left = left[~(deviation[left] <= _CLOSE * cell_size)]
         if not len(left):
             break
-    worst = deviation.max(initial=0.0)
-    if not worst <= _NEAR_ENOUGH * cell_size:
-        raise KernelError(f"a curve where the lattice crosses the part was fitted to {worst:.2g} mm only")
-    ends = zip(paths.pair.tolist(), paths.start.tolist(), paths.end.tolist(), strict=True)
-    return [
-        SectionCurve(pair, start, end, some[:, :2], some[:, 2:5], some[:, 5:], float(off))
-        for (pair, start, end), some, off in zip(ends, control, deviation, strict=True)
-    ]
+    return control, deviation
+
+
+def _parted(pairs: Pairs, paths: Paths, which: Integers, first: int) -> tuple[Paths, list[Floats]]:
+    """Some of the curves in two, where they are halfway, between nodes with numbers of their own; and those points."""
+    halves: list[tuple[int, int, int]] = []
+    places: list[Floats] = []
+    near: list[Floats] = []
+    points: list[Floats] = []
+    for path in which.tolist():
+        pair, start, end = int(paths.pair[path]), int(paths.start[path]), int(paths.end[path])
+        way = np.hstack([paths.places[path], paths.near[path]])
+        even = _spread(way, _run(way[:, :2]), np.linspace(0, 1, 2 * _HALF + 1))[np.newaxis]
+        found, even = _onto_curve(pairs, np.array([pair]), even, even[:, [0, -1]])
+        node = first + len(points)
+        points.append(found[0, _HALF])
+        halves += [(pair, start, node), (pair, node, end)]
+        for half in (slice(0, _HALF + 1), slice(_HALF, None)):
+            places.append(even[0, half, :2])
+            near.append(even[0, half, 2:])
+    numbers = np.array(halves, dtype=np.int64)
+    return Paths(numbers[:, 0], numbers[:, 1], numbers[:, 2], places, near), points
 
 
 def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Floats, Floats]:

@@ -142,7 +142,7 @@ def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
         name, get, sizes = simple
         element = getattr(adaptor, get)()
         return Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
-    free = FreeForm(_derivatives(adaptor), *face.range)
+    free = FreeForm(_derivatives(adaptor), *face.range, _breaks(adaptor))
     if kind == GeomAbs_SurfaceOfExtrusion:
         direction = np.array(_values(adaptor.Direction()))
         return Swept(free, np.zeros(3), direction, _curve_in_space(adaptor.BasisCurve(), 2), False)
@@ -152,6 +152,21 @@ def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
         swept = Swept(free, at, along, _curve_in_space(adaptor.BasisCurve(), 2), True)
         return swept if swept.planar else free
     return free
+
+
+def _breaks(adaptor: BRepAdaptor_Surface) -> tuple[Floats, Floats]:
+    """Knots of a surface along both its parameters."""
+    kind, none = adaptor.GetType(), np.zeros(0)
+    if kind == GeomAbs_BSplineSurface:
+        spline = adaptor.BSpline()
+        along_s = [spline.UKnot(k) for k in range(1, spline.NbUKnots() + 1)]
+        return np.array(along_s), np.array([spline.VKnot(k) for k in range(1, spline.NbVKnots() + 1)])
+    if kind in (GeomAbs_SurfaceOfExtrusion, GeomAbs_SurfaceOfRevolution):
+        curve = adaptor.BasisCurve()
+        if curve.GetType() == GeomAbs_BSplineCurve:
+            knots = np.array([curve.BSpline().Knot(k) for k in range(1, curve.BSpline().NbKnots() + 1)])
+            return (knots, none) if kind == GeomAbs_SurfaceOfExtrusion else (none, knots)
+    return none, none
 
 
 # What each simple surface is called here and by the kernel, and what its sizes are called.

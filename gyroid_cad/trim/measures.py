@@ -14,7 +14,7 @@ from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.edge_crossings import square_points
-from gyroid_cad.trim.surfaces import Quadric
+from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface, Swept
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["Measures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 
 _PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 16
 # Of a face of the part that is no plane, along each parameter.
-_SPANS = 12
+_SPANS, _MOST_SPANS = 12, 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,14 +155,27 @@ class _Samples:
     def __init__(self, face: BoundaryFace, middle: Floats) -> None:
         self.low, high = face.range
         self.scale = (high - self.low) / 2
-        spans = 1 if isinstance(face.surface, Quadric) and face.surface.kind == "plane" else _SPANS
-        self.quadrature = SquareQuadrature(np.linspace(-1, 1, spans + 1))
+        self.quadrature = SquareQuadrature(self._knots(face.surface))
         nodes = self.quadrature.places
         grid = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
         places = self.low + self.scale * (grid + 1)
         vectors, points = face.surface.area_vectors(places), face.surface.points(places)
         flux, area = dot(points - middle, vectors) / 3, np.linalg.norm(vectors, axis=1)
         self.density = np.stack([flux, area], axis=-1).reshape(len(nodes), len(nodes), 2) * np.prod(self.scale)
+
+    def _knots(self, surface: Surface) -> Floats:
+        """Knots on [-1, 1] along both parameters, such that the densities are smooth between them."""
+        if isinstance(surface, Quadric):
+            return np.linspace(-1, 1, 2 if surface.kind == "plane" else _SPANS + 1)
+        free = surface.free if isinstance(surface, Swept) else surface
+        assert isinstance(free, FreeForm)
+        own = np.concatenate(
+            [(breaks - low) / scale - 1 for breaks, low, scale in zip(free.breaks, self.low, self.scale, strict=True)]
+        )
+        # Knots of either parameter serve both; nearer than this they are one, and too many are left out.
+        knots = np.round(np.concatenate([own, np.linspace(-1, 1, _SPANS // 2 + 1)]), 9)
+        inner = np.unique(knots[(knots > -1 + 1e-4) & (knots < 1 - 1e-4)])
+        return np.concatenate([[-1.0], inner if len(inner) < _MOST_SPANS else np.linspace(-1, 1, 25)[1:-1], [1.0]])
 
     def over(self, places: Floats, rates: Floats) -> Floats:
         square = np.clip((places - self.low) / self.scale - 1, -1, 1)

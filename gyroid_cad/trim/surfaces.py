@@ -167,11 +167,14 @@ class FreeForm:
         From parameters s, t, shape (n,), to points and derivatives by s, t, ss, st and tt, each of shape (n, 3).
     low, high : ndarray, shape (2,)
         Of the parameters.
+    breaks : tuple of ndarray
+        Values of s and of t where its polynomials end.
     """
 
     derivatives: Callable[[Floats, Floats], tuple[Floats, ...]]
     low: Floats
     high: Floats
+    breaks: tuple[Floats, Floats] = (np.zeros(0), np.zeros(0))
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """As of :class:`Surface`."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from math import pi
-from pathlib import Path
 from typing import Any
 
 import cadquery as cq
@@ -12,6 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from OCP.BRepGProp import BRepGProp
+from OCP.GProp import GProp_GProps
 
 import gyroid_cad.filling.part
 import gyroid_cad.filling.roads
@@ -22,7 +23,6 @@ from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.surface.fit import FitSettings
 
 COARSE = FitSettings(5)
-PARTS = Path(__file__).parents[3] / "shared" / "parts"
 
 
 def plate() -> cq.Workplane:
@@ -38,7 +38,14 @@ def loft() -> cq.Workplane:
 
 
 def vase() -> cq.Workplane:
-    return cq.Workplane("XZ").moveTo(2, 0).spline([(4, 2), (3, 5), (4, 7)], includeCurrent=True).lineTo(2, 7).close().revolve()
+    return (
+        cq.Workplane("XZ")
+        .moveTo(2, 0)
+        .spline([(4, 2), (3, 5), (4, 7)], includeCurrent=True)
+        .lineTo(2, 7)
+        .close()
+        .revolve()
+    )
 
 
 def filleted() -> cq.Workplane:
@@ -77,8 +84,14 @@ def test_wall_and_channels_are_the_whole_part(name: str) -> None:
     wall, channels = (crossed(part, kind=kind, surface="primitive") for kind in ("sheet", "channels"))
     assert wall.valid
     assert wall.closed
-    whole = measure(part.val().wrapped)[0]
-    assert wall.volume + channels.volume == pytest.approx(whole, rel=1e-6)
+    # The kernel's own measure of a spline turned about an axis is off by 1e-3, unless it is asked for more.
+    assert wall.volume + channels.volume == pytest.approx(volume(part), rel=1e-6)
+
+
+def volume(part: cq.Workplane) -> float:
+    found = GProp_GProps()
+    BRepGProp.VolumeProperties_s(part.val().wrapped, found, 1e-10)
+    return float(found.Mass())
 
 
 def test_of_a_ball_and_a_ring_that_holds_to_nine_digits() -> None:
@@ -89,8 +102,8 @@ def test_of_a_ball_and_a_ring_that_holds_to_nine_digits() -> None:
 
 @pytest.mark.parametrize("kind", ["sheet", "network-a", "surface"])
 def test_the_kernels_fuse_comes_to_the_same(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    sizes = {} if kind == "surface" else {"density": 0.3}
-    ours = crossed(plate(), kind=kind, **{"density": None, **sizes})
+    sizes: dict[str, Any] = {"density": None if kind == "surface" else 0.3, "origin": (0.3, 0.2, 0.1)}
+    ours = crossed(plate(), kind=kind, **sizes)
     every = gyroid_cad.filling.roads.taken
 
     def taken(road: str, *arguments: Any) -> Any:
@@ -109,25 +122,7 @@ def test_the_kernels_fuse_comes_to_the_same(kind: str, monkeypatch: pytest.Monke
 
 def test_a_wall_graded_through_a_part_is_cut_too() -> None:
     reports = [crossed(plate(), kind=kind, density="0.25 + 0.01*x", tolerance=1e-2) for kind in ("sheet", "channels")]
-    whole = measure(plate().val().wrapped)[0]
-    assert sum(report.volume for report in reports) == pytest.approx(whole, rel=1e-6)
-
-
-def test_a_hole_that_grazes_the_wall_leaves_a_closed_curve_in_it() -> None:
-    # The pin's end pokes through the wall's middle, where no edge of either comes near.
-    pin = cq.Workplane().sphere(0.35).translate((1.5, 1.5, 1.5))
-    report = crossed(pin, cell_size=24)
-    assert report.valid
-    assert 0 < report.volume <= 4 / 3 * pi * 0.35**3 * (1 + 1e-9)
-
-
-def test_edges_that_files_state_too_closely_are_given_the_tolerance_they_need() -> None:
-    path = PARTS / "dm1-id-214.step"
-    if not path.exists():
-        pytest.skip("the folder of parts that others drew is not here")
-    from gyroid_cad.filling.part import parts_of  # noqa: PLC0415
-
-    assert parts_of is not None
+    assert sum(report.volume for report in reports) == pytest.approx(volume(plate()), rel=1e-6)
 
 
 sizes = st.floats(2.0, 6.0)
@@ -173,7 +168,7 @@ def test_random_parts_are_filled_wholly_or_refused_for_a_reason(part: cq.Workpla
     except KernelError as refused:
         assert "no booleans here" in str(refused)  # noqa: PT017
         return
-    assert wall.volume + channels.volume == pytest.approx(measure(shape)[0], rel=1e-5)
+    assert wall.volume + channels.volume == pytest.approx(volume(part), rel=1e-5)
 
 
 def test_numbers_of_nodes_do_not_depend_on_where_the_part_stands() -> None:

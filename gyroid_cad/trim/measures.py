@@ -22,7 +22,7 @@ __all__ = ["Measures", "boundary_measures", "joined", "lattice_measures", "whole
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 16
+_PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 64
 # Of a face of the part that is no plane, along each parameter.
 _SPANS, _MOST_SPANS = 12, 40
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ _POINTS_ON_PIECE, _POINTS_ON_EDGE = 24, 16
 _OFF = 1e-3
 # Share of the points on a piece that are to be as deep as the skin is thick: those near a crossing say little.
 _MOST = 0.5
+# Of the thickness of a skin, within which places are one: more where two tubes that meet touch before they cross.
+_FUZZY = (0.0, 1e-3)
 
 
 def core_of_pieces(solid: TopoDS_Solid, skin: float) -> list[TopoDS_Solid]:
@@ -58,18 +61,30 @@ def core_of_pieces(solid: TopoDS_Solid, skin: float) -> list[TopoDS_Solid]:
     lone = {users[0][0] for users in _users(pieces).values() if len(users) == 1}
     whole = [piece for index, piece in enumerate(pieces) if deep[index] and index not in lone]
     crossing = [piece for index, piece in enumerate(pieces) if not deep[index] or index in lone]
+    for fuzzy in _FUZZY[:-1]:
+        with suppress(KernelError):
+            return _assembled(whole, crossing, skin, depths, fuzzy)
+    return _assembled(whole, crossing, skin, depths, _FUZZY[-1])
+
+
+def _assembled(
+    whole: Sequence[TopoDS_Face], crossing: Sequence[TopoDS_Face], skin: float, depths: NearDistances, fuzzy: float
+) -> list[TopoDS_Solid]:
+    """The solids that pieces bound, once those that cross are cut against each other."""
+    faces = list(whole)
     if crossing:
-        fuse = _cut(crossing)
+        fuse = _cut(crossing, fuzzy * skin)
         images = [as_face(image) for piece in crossing for image in modified(fuse, piece)]
         kept = [image for image in images if _is_deep(image, skin, depths)]
-        whole = [*with_changes(whole, changes(fuse, compound_of(crossing))), *kept]
-    _require_closed(whole)
-    return solids_of(whole)
+        faces = [*with_changes(whole, changes(fuse, compound_of(crossing))), *kept]
+    _require_closed(faces)
+    return solids_of(faces)
 
 
-def _cut(pieces: Iterable[TopoDS_Face]) -> BOPAlgo_Builder:
+def _cut(pieces: Iterable[TopoDS_Face], fuzzy: float) -> BOPAlgo_Builder:
     fuse = BOPAlgo_Builder()
     fuse.SetNonDestructive(True)
+    fuse.SetFuzzyValue(fuzzy)
     for piece in pieces:
         fuse.AddArgument(piece)
     fuse.Perform()

@@ -143,6 +143,14 @@ def test_faces_that_close_on_themselves_and_are_splines_have_cores_too() -> None
     assert measure(core)[0] == pytest.approx(measure(exact)[0], rel=1e-4)
 
 
+def test_tubes_that_touch_before_they_cross_are_cut_where_places_are_called_one_more_freely() -> None:
+    block = bd.Pos(-0.354, 1.975, -1.587) * bd.Rot(28.723, 85.504, 40.446) * bd.Box(8.233, 6.438, 4.016)
+    solid = solid_of(bd.Cylinder(2.779, 6.814) + block)
+    core = core_of_pieces(solid, 0.227)
+    assert all(is_valid(one) and topology(one).closed for one in core)
+    assert Depths(solid, []).confirm(core, 0.227)
+
+
 def test_where_it_does_not_close_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     def all_but_one(*arguments: object) -> list[TopoDS_Shape]:
         return pieces(*arguments)[1:]  # type: ignore[arg-type]

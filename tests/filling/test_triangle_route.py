@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,9 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepP
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
 from gyroid_cad import FilledTriangles, Lattice, ParameterError, fill
-from gyroid_cad.errors import PartWarning, SealedVoidsWarning
+from gyroid_cad.cli.app import main
+from gyroid_cad.errors import KernelError, PartWarning, SealedVoidsWarning
+from gyroid_cad.filling.part import Filling
 from gyroid_cad.filling.triangle_part import triangle_part
 from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import compound_of
@@ -263,3 +266,30 @@ def test_whatever_solids_overlap_wall_and_channels_make_up_what_they_take_up(pie
         volumes.append(made.report.volume)
     # Voids too small to be any, and corners moved by a part of the deviation.
     assert sum(volumes) == pytest.approx(made.report.part_volume, rel=2e-3)
+
+
+def test_where_the_kernel_fails_its_error_names_the_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failing(*_: object) -> None:
+        raise KernelError("pieces do not close")
+
+    monkeypatch.setattr(Filling, "run", failing)
+    with pytest.raises(KernelError, match='pieces do not close; route="triangles" fills it for STL, 3MF, OBJ and PLY'):
+        fill(ball(), CELL, density=0.3)
+    write_brep(ball(), tmp_path / "ball.brep")
+    arguments = ["fill", str(tmp_path / "ball.brep"), "-o", str(tmp_path / "a.step"), "--cell-size", "6"]
+    assert main([*arguments, "--density", "0.3"]) == 1
+    assert "pieces do not close; --route triangles fills it for STL" in capsys.readouterr().err
+
+
+def test_the_route_follows_from_what_is_written_unless_it_is_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_brep(box(4.0, 4.0, 4.0), tmp_path / "box.brep")
+    usual = ["fill", str(tmp_path / "box.brep"), "--cell-size", "8", "--density", "0.3", "--json", "--deviation", "0.1"]
+    routes = []
+    for options in (["a.stl"], ["b.step"], ["c.stl", "--route", "brep"]):
+        assert main([*usual, "--control-points", "5", "-o", str(tmp_path / options[0]), *options[1:]]) == 0
+        routes.append(json.loads(capsys.readouterr().out)["route"])
+    assert routes == ["triangles", "brep", "brep"]

@@ -1,9 +1,9 @@
 """Skins of parts: what each part of a folder leaves inside a skin, and why where there is none.
 
 Solids of a part that do not overlap are parts by themselves. The skin is three hundredths of the smallest side of the
-box round the part. Of each core: its volume, whether it is
-valid and closed and comes back whole from a STEP file, how far points of its faces are from being as deep as the skin
-is thick, and the seconds it took, the reading of the part not counted.
+box round the part. Of each core: its volume, whether it is valid and closed and comes back whole from a STEP file, how
+far points of its faces are from being as deep as the skin is thick, and the seconds it took, the reading of the part
+not counted.
 
 Run: ``python -m benchmarks.skins [--small] [DIR]``; ``--small``, or no folder, takes two parts made here.
 """
@@ -25,9 +25,8 @@ from OCP.TopoDS import TopoDS_Shape
 
 from benchmarks.timing import Row, arguments_for, print_verdicts
 from gyroid_cad.errors import GyroidError
-from gyroid_cad.filling.part import parts_of
-from gyroid_cad.kernel import check
-from gyroid_cad.kernel.check import is_valid, topology
+from gyroid_cad.filling.part import bodies_of
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.depth import FaceDistances, points_on
 from gyroid_cad.kernel.part import Part, require_part
@@ -70,7 +69,7 @@ def _parts(folder: Path | None) -> Iterator[tuple[str, Part | str]]:
         return
     for path in sorted(folder.glob("*.st*p")):
         try:
-            bodies, _ = parts_of(path)
+            bodies, _ = bodies_of(path)
         except GyroidError as refused:
             yield path.stem, str(refused)
             continue
@@ -98,8 +97,8 @@ def _found(name: str, part: Part | str) -> _Found:
 
 def _distance_error(part: TopoDS_Shape, core: TopoDS_Shape, skin: float) -> float:
     """Largest difference from the skin of the distance of a core's faces from the part's, in skins."""
-    distances = FaceDistances(check.parts_of(part, TopAbs_FACE))
-    points = [points_on(as_face(face), _POINTS_ON_FACE) for face in check.parts_of(core, TopAbs_FACE)]
+    distances = FaceDistances(parts_of(part, TopAbs_FACE))
+    points = [points_on(as_face(face), _POINTS_ON_FACE) for face in parts_of(core, TopAbs_FACE)]
     return float(np.abs(distances.distances(np.concatenate(points)) / skin - 1).max())
 
 

@@ -138,7 +138,7 @@ class _Pieces:
         return bend is not None and bool(np.abs(bend).max() < _SMOOTH)
 
     def _corners(self) -> tuple[dict[int, list[Floats]], dict[tuple[int, int], int]]:
-        """What faces' offsets make of corners, numbered: places by number, and numbers by corner and face.
+        """Corners that the faces' offsets make, numbered: places by number, and numbers by corner and face.
 
         Offsets of faces that are smooth at a corner make one place of it.
         """

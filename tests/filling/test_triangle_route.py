@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
-from OCP.gp import gp_Pnt
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
 from gyroid_cad import FilledTriangles, Lattice, ParameterError, fill
-from gyroid_cad.errors import PartWarning, SealedVoidsWarning
+from gyroid_cad.cli.app import main
+from gyroid_cad.errors import KernelError, PartWarning, SealedVoidsWarning
+from gyroid_cad.filling.part import Filling
+from gyroid_cad.filling.triangle_part import triangle_part
 from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import compound_of
+from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.surface.families import USUAL
 
 CELL, DEVIATION = 6.0, 0.02
@@ -119,7 +126,7 @@ def test_a_part_far_from_the_origin_keeps_its_digits_and_files_of_single_precisi
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("options", "words"),
     [
         ({"kind": "surface", "density": None}, "kind = 'surface': expected one that bounds a volume"),
         ({"route": "mesh"}, "route = 'mesh': expected brep or triangles"),
@@ -127,9 +134,9 @@ def test_a_part_far_from_the_origin_keeps_its_digits_and_files_of_single_precisi
         ({"route": "brep"}, "deviation = 0.02: expected none at route brep"),
     ],
 )
-def test_what_the_route_cannot_do_is_refused_in_one_line(given: dict[str, Any], words: str) -> None:
+def test_what_the_route_cannot_do_is_refused_in_one_line(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError) as refused:
-        filled(ball(), **given)
+        filled(ball(), **options)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
 
@@ -205,3 +212,84 @@ def test_bodies_are_filled_each_by_itself_and_those_that_overlap_are_united() ->
         united = fill(overlapping, CELL, density=0.3, route="triangles", deviation=0.05)
     assert united.report.part_volume == pytest.approx(110.0)
     assert united.report.bodies == 1
+
+
+# As they come from other programs, beside the repository where they are there.
+PARTS = Path(__file__).resolve().parents[2].parent / "shared" / "parts"
+
+
+@pytest.mark.parametrize("name", ["nozzle_band", "touching", "cone_apex"])
+@pytest.mark.parametrize("share", [None, 0.03])
+def test_parts_of_other_programs_are_filled_and_closed(name: str, share: float | None, tmp_path: Path) -> None:
+    if not (PARTS / f"{name}.step").exists():
+        pytest.skip("the parts are not there")
+    part = triangle_part(PARTS / f"{name}.step", (), 0.5)
+    size = float((part.high - part.low).min())
+    skin = None if share is None else share * size
+    made = filled(PARTS / f"{name}.step", cell_size=size / 3, deviation=size / 100, skin=skin)
+    made.write(tmp_path / "part.stl")
+    assert read(tmp_path / "part.stl").is_watertight
+    if skin is None:
+        # What is dropped of it are islands, and the part is not many cells wide.
+        assert made.report.density == pytest.approx(0.3, rel=0.1)
+
+
+SIDES = st.floats(3.0, 7.0)
+PLACES = st.floats(-3.0, 3.0)
+
+
+def primitive(kind: str, side: float, place: tuple[float, float, float]) -> Any:
+    at = gp_Pnt(*place)
+    if kind == "ball":
+        return BRepPrimAPI_MakeSphere(at, side / 1.5).Shape()
+    if kind == "box":
+        return BRepPrimAPI_MakeBox(at, side, side + 1.0, side - 1.0).Shape()
+    return BRepPrimAPI_MakeCylinder(gp_Ax2(at, gp_Dir(1.0, 0.5, 0.2)), side / 2, side).Shape()
+
+
+@settings(max_examples=3, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["ball", "box", "cylinder"]), SIDES, st.tuples(PLACES, PLACES, PLACES)),
+        min_size=1,
+        max_size=3,
+    ),
+    st.booleans(),
+)
+def test_whatever_solids_overlap_wall_and_channels_make_up_what_they_take_up(pieces: list[Any], skinned: bool) -> None:
+    part = compound_of([primitive(*piece) for piece in pieces])
+    given_skin = {"skin": 0.4} if skinned else {}
+    volumes = []
+    for kind in ("sheet", "channels"):
+        made = filled(part, kind=kind, keep_islands=True, deviation=0.1, **given_skin)
+        assert unmatched_edges(made.triangles) == 0
+        volumes.append(made.report.volume)
+    # Voids too small to be any, and corners moved by a part of the deviation.
+    assert sum(volumes) == pytest.approx(made.report.part_volume, rel=2e-3)
+
+
+def test_where_the_kernel_fails_its_error_names_the_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failing(*_: object) -> None:
+        raise KernelError("pieces do not close")
+
+    monkeypatch.setattr(Filling, "run", failing)
+    with pytest.raises(KernelError, match='pieces do not close; route="triangles" fills it for STL, 3MF, OBJ and PLY'):
+        fill(ball(), CELL, density=0.3)
+    write_brep(ball(), tmp_path / "ball.brep")
+    arguments = ["fill", str(tmp_path / "ball.brep"), "-o", str(tmp_path / "a.step"), "--cell-size", "6"]
+    assert main([*arguments, "--density", "0.3"]) == 1
+    assert "pieces do not close; --route triangles fills it for STL" in capsys.readouterr().err
+
+
+def test_the_route_follows_from_what_is_written_unless_it_is_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_brep(box(4.0, 4.0, 4.0), tmp_path / "box.brep")
+    usual = ["fill", str(tmp_path / "box.brep"), "--cell-size", "8", "--density", "0.3", "--json", "--deviation", "0.1"]
+    routes = []
+    for options in (["a.stl"], ["b.step"], ["c.stl", "--route", "brep"]):
+        assert main([*usual, "--control-points", "5", "-o", str(tmp_path / options[0]), *options[1:]]) == 0
+        routes.append(json.loads(capsys.readouterr().out)["route"])
+    assert routes == ["triangles", "brep", "brep"]

@@ -18,7 +18,7 @@ from gyroid_cad.common.formats import OBJ, STL, THREE_MF, TRIANGLE_FORMATS, Form
 from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["STL_RECORD", "binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles"]
+__all__ = ["STL_RECORD", "binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles", "renumbered"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -118,12 +118,18 @@ def numbered_corners(corners: NDArray[Real]) -> tuple[NDArray[Real], Integers, B
         Without slivers two of whose corners are one: what bounds nothing.
     kept : ndarray of bool, shape (triangles,)
     """
+    places = corners.reshape(-1, 3)
+    return renumbered(places, np.arange(len(places)).reshape(-1, 3))
+
+
+def renumbered(vertices: NDArray[Real], triangles: Integers) -> tuple[NDArray[Real], Integers, Booleans]:
+    """Triangles whose vertices of the same coordinates are made one, as :func:`numbered_corners` gives them."""
     # Minus zero is zero.
-    flat = np.ascontiguousarray(corners.reshape(-1, 3) + corners.dtype.type(0))
+    flat = np.ascontiguousarray(vertices + vertices.dtype.type(0))
     first, numbers = _distinct(flat)
-    triangles = numbers.reshape(-1, 3)
-    kept = np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)
-    return flat[first], triangles[kept], kept
+    found = numbers[triangles]
+    kept = np.all(found != np.roll(found, 1, axis=1), axis=1)
+    return flat[first], found[kept], kept
 
 
 # Odd numbers of 64 bits without a pattern, by which the bits of coordinates are mixed.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import OBJ, PLY, STL, THREE_MF, TRIANGLE_FORMATS, require_format
 from gyroid_cad.errors import ExportError
-from gyroid_cad.mesh.triangles.files import STL_RECORD, numbered_corners, read_triangles
+from gyroid_cad.mesh.triangles.files import STL_RECORD, read_triangles, renumbered
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import STL_HEADER
 
@@ -67,7 +67,7 @@ def storable_triangles(vertices: Floats, triangles: Integers) -> tuple[Floats, I
     """
     rounded = vertices.astype(np.float32)
     for attempt in range(_TRIES):
-        places, numbers, _ = numbered_corners(rounded[triangles])
+        places, numbers, _ = renumbered(rounded, triangles)
         if not unmatched_edges(numbers):
             return places.astype(np.float64), numbers
         rounded = _parted(vertices, triangles, rounded, 2.0**attempt)

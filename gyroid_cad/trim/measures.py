@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.section_fit import SectionCurve
 from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface, Swept
 from gyroid_cad.wall.offset import Wall
 
@@ -99,7 +101,7 @@ def _square_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
 
     def stretch(edge: CutEdge, forward: bool) -> Stretch:
         if edge.kind == "section":
-            return _along(cut.sections[edge.number].square, len(cut.sections[edge.number].in_square))
+            return _along(cut.sections[edge.number], SectionCurve.square)
         side = sides.index(edge.number % complex.edge_count)
         sign = 1.0 if complex.edge_forward[patch, side] else -1.0
         # Of the other sides either the integral or the rate is 0.
@@ -188,7 +190,7 @@ def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
 
     def stretch(edge: CutEdge, forward: bool) -> Stretch:
         if edge.kind == "section":
-            return _along(cut.sections[edge.number].part, len(cut.sections[edge.number].on_part))
+            return _along(cut.sections[edge.number], SectionCurve.part)
         coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == forward)
         t, weights = gauss_points(np.linspace(edge.first, edge.last, _PART_PIECES + 1), _PER_STRETCH)
         places, rates, *_ = coedge.curve(np.concatenate([t, [edge.first, edge.last]]))
@@ -197,7 +199,12 @@ def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
     return _border(cut, piece, stretch)
 
 
-def _along(curve: Callable[..., Floats], stations: int) -> Stretch:
+def _along(section: SectionCurve, curve: Callable[..., Floats]) -> Stretch:
     """Places and rates of a section curve at Gauss points between its stations, their weights, and its ends."""
-    t, weights = gauss_points(np.linspace(0, 1, stations), _PER_STRETCH)
-    return curve(t), curve(t, 1)[:, 1], weights, curve(np.array([0.0, 1.0]))
+    t, weights = _gauss_between(len(section.in_space))
+    return curve(section, t), curve(section, t, 1)[:, 1], weights, curve(section, np.array([0.0, 1.0]))
+
+
+@lru_cache
+def _gauss_between(stations: int) -> tuple[Floats, Floats]:
+    return gauss_points(np.linspace(0, 1, stations), _PER_STRETCH)

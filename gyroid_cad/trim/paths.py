@@ -326,15 +326,14 @@ def _on_curves(
     assert near is not None
     good = (np.linalg.norm(back, axis=1) < 1e-8) & (np.abs(at).max(axis=1) < 1)
     good &= np.linalg.norm(at - place, axis=1) < 2 * step
-    kept = []
     for row in np.flatnonzero(good).tolist():
         paths = by_pair.get(int(pair[row]), [])
-        if any(
-            np.linalg.norm(_dense(known.places[path], step / 4) - at[row], axis=1).min() < step / 4 for path in paths
-        ):
-            continue
-        if pairs.boundary.faces[int(pairs.part[pair[row]])].contains(near[row])[0]:
-            kept.append(row)
+        beside = (np.linalg.norm(_dense(known.places[path], step / 4) - at[row], axis=1).min() for path in paths)
+        good[row] = not any(distance < step / 4 for distance in beside)
+    left = np.flatnonzero(good)
+    for part, rows in grouped(pairs.part[pair[left]]):
+        good[left[rows]] = pairs.boundary.faces[part].contains(near[left[rows], 0])
+    kept = np.flatnonzero(good)
     return pair[kept], at[kept]
 
 

@@ -11,7 +11,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.trim.lattice_faces import Pairs, grouped
 from gyroid_cad.trim.paths import Paths
-from gyroid_cad.trim.sections import section_knots
+from gyroid_cad.trim.sections import on_section, section_knots
 
 __all__ = ["SectionCurve", "fitted_sections"]
 
@@ -58,11 +58,11 @@ class SectionCurve:
 
     def square(self, t: Floats, derivative: int = 0) -> Floats:
         """Places in the square at parameters in [0, 1], or their rate of change; shape (q, 2)."""
-        return np.asarray(basis(section_knots(len(self.in_square)), 3, t, derivative) @ self.in_square)
+        return on_section(self.in_square, t, derivative)
 
     def part(self, t: Floats, derivative: int = 0) -> Floats:
         """Parameters of the part's face, or their rate of change; shape (q, 2)."""
-        return np.asarray(basis(section_knots(len(self.on_part)), 3, t, derivative) @ self.on_part)
+        return on_section(self.on_part, t, derivative)
 
 
 def fitted_sections(

@@ -52,6 +52,7 @@ def filleted() -> cq.Workplane:
     return cq.Workplane().box(8, 7, 6).edges("|Z").fillet(1.5).edges(">Z").fillet(0.8)
 
 
+# Of each kind of surface one.
 DRAWN = {
     "plate": plate,
     "ball": lambda: cq.Workplane().sphere(4).translate((0.2, 0.1, 0.3)),
@@ -158,7 +159,7 @@ def combined(draw: st.DrawFn) -> cq.Workplane:
 
 
 # Each takes about a second: many are tried by the benchmark of random parts.
-@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(part=combined())
 def test_random_parts_are_filled_wholly_or_refused_for_a_reason(part: cq.Workplane) -> None:
     shape = part.val().wrapped if part.vals() else None

@@ -20,6 +20,7 @@ import gyroid_cad.kernel.regions
 from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError, SealedVoidsWarning
 from gyroid_cad.filling.fill import Filled, fill
 from gyroid_cad.filling.part import part_of
+from gyroid_cad.filling.roads import Made
 from gyroid_cad.filling.wanted import KINDS
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure
@@ -384,10 +385,9 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
 
 @pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
 def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
-    solids = [peg().val().wrapped] if wrong == "the part itself" else []
-    only_by(monkeypatch, "booleans")
-    monkeypatch.setattr(gyroid_cad.filling.roads, "split_by_region", lambda *arguments: None)
-    monkeypatch.setattr(gyroid_cad.filling.roads, "bounded_solids", lambda *arguments: solids)
+    solid = peg().val().wrapped
+    made = [Made(solid, *measure(solid))] if wrong == "the part itself" else []
+    monkeypatch.setattr(gyroid_cad.filling.part, "taken", lambda *arguments: ({"sheet": made}, 0, 0))
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(peg(), CELL, WALL, fit=COARSE)
 

@@ -208,7 +208,7 @@ def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Foun
 
 
 def _joined(job: Job, infill: Infill, region: Region, pieces: Pieces, whole: list[Any]) -> list[KernelShape]:
-    """What pieces of the lattice and of the part bound."""
+    """Solids, or shells, that pieces of the lattice and of the part bound."""
 
     def wanted_at(point: Floats) -> bool:
         return bool(infill.contains(region, point[np.newaxis])[0])

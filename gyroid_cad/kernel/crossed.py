@@ -1,4 +1,4 @@
-"""What a part leaves of a lattice's faces, and they of its boundary, as faces of the kernel that share their edges."""
+"""Faces of the kernel that share their edges: of a lattice what a part leaves, and of its boundary what they leave."""
 
 from __future__ import annotations
 

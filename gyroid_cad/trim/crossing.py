@@ -82,7 +82,7 @@ class CutLoops:
 
 @dataclass(eq=False)
 class Crossing:
-    """What is left of a wall's faces in a part, and of the part's boundary in and beside the region they bound.
+    """Pieces of a wall's faces in a part, and of the part's boundary in and beside the region they bound.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ class _Work:
     # The lattice ----------------------------------------------------------------------------------------------------
 
     def cut_lattice(self, in_part: Callable[[Floats], Booleans]) -> None:
-        """What is left of the wall's faces in the part."""
+        """Find the pieces of the wall's faces that lie in the part."""
         fans, inside = self._fans_inside(in_part)
         for face in range(len(self.made.faces)):
             links: list[_Link] = []
@@ -291,7 +291,7 @@ class _Work:
     # The part -------------------------------------------------------------------------------------------------------
 
     def cut_boundary(self, in_region: Callable[[Floats], Booleans], outer: bool) -> None:
-        """What is left of the part's faces in the region, and beside it."""
+        """Find the pieces of the part's faces in the region, and beside it."""
         starts_inside = self._edges_inside(in_region)
         stretches = [self._part_stretches(edge, inside) for edge, inside in enumerate(starts_inside.tolist())]
         for number, face in enumerate(self.made.boundary.faces):
@@ -300,11 +300,11 @@ class _Work:
                 self._cut_face(number, face, stretches, False, self.made.outer)
 
     def _leaves(self, node: int) -> bool:
-        """Whether an edge of the part leaves the region at a node."""
+        """Tell whether an edge of the part leaves the region at a node."""
         return bool(self.part_nodes.upwards[node] != self.made.backwards[self.part_nodes.face[node]])
 
     def _edges_inside(self, in_region: Callable[[Floats], Booleans]) -> Booleans:
-        """Whether each edge of the part lies in the region where it starts."""
+        """Mask of the part's edges that lie in the region where they start."""
         edges = self.made.boundary.edges
         told = np.zeros((2, len(self.made.boundary.vertices)), dtype=bool)
         for number, nodes in self.nodes_of_edge.items():

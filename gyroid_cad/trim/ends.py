@@ -1,4 +1,4 @@
-"""Where curves begin and end: nodes on rims of the wall and on edges of the part, as each pair of faces has them."""
+"""Beginnings and ends of curves: nodes on rims of the wall and on edges of the part, as each pair of faces has them."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ _AT_ONCE = 2**12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RimNodes:
-    """Where rims of the wall's faces cross the part's boundary, ordered by rim and along it.
+    """Crossings of rims of the wall's faces with the part's boundary, ordered by rim and along it.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class RimNodes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartNodes:
-    """Where edges of the part cross faces of the wall, ordered by edge and along it.
+    """Crossings of edges of the part with faces of the wall, ordered by edge and along it.
 
     Attributes
     ----------

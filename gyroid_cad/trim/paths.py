@@ -310,7 +310,7 @@ def _dense(places: Floats, step: float = 1 / (GRID - 1)) -> Floats:
 def _on_curves(
     pairs: Pairs, pair: Integers, place: Floats, known: Paths, by_pair: dict[int, list[int]], step: float
 ) -> tuple[Integers, Floats]:
-    """Those that Newton's method takes to a curve nearby, within both faces, and not to a known one."""
+    """Places that Newton's method takes to a curve nearby, within both faces, and not to a known one."""
     if not len(pair):
         return pair, place
     near: Floats | None = None

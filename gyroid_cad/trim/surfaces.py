@@ -267,7 +267,7 @@ class Swept:
 
     @property
     def planar(self) -> bool:
-        """Whether the axis lies in the curve's plane, and the curve on one side of it."""
+        """True if the axis lies in the curve's plane, and the curve on one side of it."""
         points = self.curve(np.linspace(self.free.low[1], self.free.high[1], 33))[0] - self.origin
         x, y = self._across
         size = np.ptp(points, axis=0).max()

@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 
 from benchmarks.timing import ROOT, arguments_for, fresh_python, plain_table
-from gyroid_cad.common.doors import FILL
 from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import read_step, topology_in_step, write_step
@@ -39,18 +38,19 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 DENSITY, CELLS, SKIN = 0.3, 3.0, 0.03
-_BY_TRIANGLES = ("--route", "triangles") if any(row.option == "route" for row in FILL) else ()
+_BY_TRIANGLES, _BY_BREP = ("--route", "triangles"), ("--route", "brep")
 # Ending of the file, and options besides those that all have; "{skin}" is its thickness.
 WAYS: dict[str, tuple[str, tuple[str, ...]]] = {
     "plain-step": ("step", ()),
-    "plain-stl": ("stl", ()),
+    "plain-stl": ("stl", _BY_BREP),
     "skin-step": ("step", ("--skin", "{skin}")),
     "skin-stl": ("stl", ("--skin", "{skin}", *_BY_TRIANGLES)),
     "triangles-stl": ("stl", _BY_TRIANGLES),
+    "network-stl": ("stl", ("--kind", "network-a", *_BY_TRIANGLES)),
     "network-step": ("step", ("--kind", "network-a")),
     "channels-step": ("step", ("--kind", "channels")),
 }
-_USUAL_WAYS = ("plain-step", "plain-stl", "skin-step", "skin-stl")
+_USUAL_WAYS = ("plain-step", "plain-stl", "triangles-stl", "skin-step", "skin-stl")
 # Of the estimate: points along the longest side of the part, and the mesh in parts of that and in radians.
 _POINTS, _DEVIATION, _ANGLE = 160, 2e-4, 0.1
 _CHECK_SECONDS = 300

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -16,22 +16,18 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
+from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
 from gyroid_cad.kernel.check import compound_of, is_valid, sealed_shells, topology, without_shells
 from gyroid_cad.kernel.part import Part, measure, require_part
-from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import bounded_solids, connected_shells
-from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
-from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
-from gyroid_cad.wall.covering import CROSSING, INSIDE, PERTURBATIONS, Frame, first_success
+from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
 
 __all__ = [
     "Filling",
@@ -56,15 +52,6 @@ _THIN_WALL = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Made:
-    """A solid, or a shell of the bare surface, with its volume in mm3 and its area in mm2."""
-
-    shape: KernelShape
-    volume: float
-    area: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
     """Solids that filling gave, and how they came about.
 
@@ -78,7 +65,7 @@ class Outcome:
     cut, whole : int
         Patches that the part's boundary may cross, and that lie wholly inside.
     by_sections : bool
-        Whether the part is a box, and so was cut without the kernel's booleans.
+        Whether it was cut without the kernel's booleans.
     """
 
     domains: dict[str, list[Made]]
@@ -136,17 +123,25 @@ class Filling:
         points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
         with self.timed("cover"):
             points = points[self.core.contains(points)]
-        # Booleans the last time in one process: should it be the joining of regions that fails.
-        attempts: list[tuple[Point, bool, int | None]] = [
-            (phase, False, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
+        infill_at = cache(lambda phase: self._shifted(frame, phase))
+        # Faces that touch the part are in doubt there: first shift, and only then ask the kernel; the last time in one
+        # process, should it be the joining of regions that fails.
+        attempts: list[tuple[Road, Point, int | None]] = [
+            ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
-        if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
-            # Faces that touch a side of the box are in doubt there: first shift, and only then ask the kernel.
-            attempts = [(phase, True, None) for phase in PERTURBATIONS] + attempts
+        # Side walls of a lattice that ends in the part are left to the kernel.
+        if infill_at(PERTURBATIONS[0]).endless:
+            attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
+            if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
+                attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
-            partial(self._attempt, number, frame, np.array(phase) * self.cell_size, points, by_sections, processes)
-            for number, (phase, by_sections, processes) in enumerate(attempts, 1)
+            partial(self._attempt, number, infill_at, phase, points, road, processes)
+            for number, (road, phase, processes) in enumerate(attempts, 1)
         )
+
+    def _shifted(self, frame: Frame, phase: Point) -> Infill:
+        """The lattice, shifted by so many cells."""
+        return self.infill_in(replace(frame, origin=frame.origin + np.array(phase) * self.cell_size), self.timed)
 
     def _attempt(self, number: int, *given: Any) -> Outcome:
         """Fill, and announce it where it fails: another attempt takes as long again."""
@@ -159,12 +154,12 @@ class Filling:
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage, self.progress)
 
-    def _filled(self, frame: Frame, shift: Floats, points: Floats, by_sections: bool, processes: int | None) -> Outcome:
-        infill = self.infill_in(replace(frame, origin=frame.origin + shift), self.timed)
-        # A block's own side walls are none of the faces that sections are found of.
-        by_sections = by_sections and infill.endless
+    def _filled(
+        self, infill_at: Callable[[Point], Infill], phase: Point, points: Floats, road: Road, processes: int | None
+    ) -> Outcome:
+        infill, shift = infill_at(phase), np.array(phase) * self.cell_size
         try:
-            made, cut, whole = self._by_sections(infill) if by_sections else self._by_booleans(infill, processes)
+            made, cut, whole = taken(road, self, infill, processes)
         except KernelError as failed:
             if infill.min_thickness >= _THIN_WALL or all(region.surface for region in self.regions):
                 raise
@@ -177,73 +172,7 @@ class Filling:
             if not domains:
                 raise KernelError("nothing of the lattice lies in the part")
             self._require_simple(piece.shape for some in domains.values() for piece in some)
-        return Outcome(domains, infill, shift, cut, whole, by_sections)
-
-    def _by_sections(self, infill: Infill) -> tuple[dict[str, list[Made]], int, int]:
-        """Fill a box, whose sides are planes, without the kernel's booleans."""
-
-        box = self.core.box
-        assert box is not None
-        corner = (box.axes @ box.low)[np.newaxis]
-        made, cut, whole = {}, 0, 0
-        for region in self.regions:
-            # A skin and what is joined to it are the part less the voids that the lattice leaves in the core.
-            skinned = self.hollow is not None and not region.fluid
-            sides = [(side, backwards != skinned) for side, backwards in region.sides]
-            with self.timed("cut"):
-                filled = not region.surface and bool(infill.contains(region, corner)[0]) != skinned
-                left = cut_to_box(infill.wall, box, sides, self.cell_size, filled, capped=not region.surface)
-            with self.timed("solid"):
-                shapes = build_trimmed(left)
-            pieces = [
-                Made(shape, 0.0 if region.surface else float(volume), float(area))
-                for shape, volume, area in zip(shapes, left.volumes, left.areas, strict=True)
-            ]
-            made[region.name] = [self._less(pieces)] if skinned else pieces
-            counted = _patches_of(left)
-            cut, whole = max(cut, counted[0]), max(whole, counted[1])
-        return made, cut, whole
-
-    def _less(self, voids: list[Made]) -> Made:
-        """The part less voids within it."""
-
-        volume, area = measure(self.part.shape)
-        shape = hollowed_by(self.part.shape, (void.shape for void in voids))
-        return Made(shape, volume - sum(void.volume for void in voids), area + sum(void.area for void in voids))
-
-    def _by_booleans(self, infill: Infill, processes: int | None = None) -> tuple[dict[str, list[Made]], int, int]:
-
-        with self.timed("cover"):
-            sides = infill.sides(PartExtent(self.core, self.cell_size).clearance, self.core.contains)
-        made = {}
-        for region in self.regions:
-            with self.timed("faces"):
-                faces = infill.faces(region)
-            cut, whole = (
-                [face for patch in np.flatnonzero(sides == side).tolist() for face in faces[patch]]
-                for side in (CROSSING, INSIDE)
-            )
-            with self.timed("split"):
-                pieces = split_by_region(
-                    self.core, cut, processes, lambda done, count: report_progress(self.progress, "split", done, count)
-                )
-
-            def wanted_at(point: Floats, region: Region = region) -> bool:
-                return bool(infill.contains(region, point[np.newaxis])[0])
-
-            with self.timed("join"):
-                if region.surface:
-                    shapes: list[Any] = connected_shells([*pieces.inside, *whole])
-                elif self.hollow is None or region.fluid:
-                    shapes = list(bounded_solids(pieces, whole, wanted_at))
-                else:
-                    shapes = list(self.hollow.solids(pieces, whole, wanted_at))
-            with self.timed("measure"):
-                made[region.name] = [
-                    Made(shape, 0.0, measure(shape)[1]) if region.surface else Made(shape, *measure(shape))
-                    for shape in shapes
-                ]
-        return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
+        return Outcome(domains, infill, shift, cut, whole, road != "booleans")
 
     def _require_right_size(self, infill: Infill, region: Region, made: list[Made], points: Floats) -> None:
         """Compare with an estimate that asks no boolean: how many of the points in the part lie in the region."""
@@ -378,13 +307,3 @@ def part_of(given: Any) -> Part:
 def _size(made: Made) -> float:
     """Volume, or of a bare surface its area."""
     return made.volume or made.area
-
-
-def _patches_of(left: TrimmedWall) -> tuple[int, int]:
-    """Count the patches that a box cuts, and those that it leaves whole."""
-    cut = {
-        face.patch
-        for face in left.faces
-        if any(patch_edge < 0 for patch_edges in face.patch_edges for patch_edge in patch_edges)
-    }
-    return len(cut), len({face.patch for face in left.faces} - cut)

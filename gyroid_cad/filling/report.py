@@ -69,7 +69,7 @@ class FillReport:
     cut_patches, whole_patches : int
         That the part's boundary may cross, and that lie wholly inside.
     by_sections : bool
-        Whether the part is a box, and so was cut without the kernel's booleans.
+        Whether it was cut without the kernel's booleans.
     shift : tuple of float
         Of the lattice, in mm, where the kernel did not manage without.
     seconds : dict

@@ -12,6 +12,7 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepClass3d import BRepClass3d
 from OCP.BRepGProp import BRepGProp
 from OCP.Geom import Geom_BSplineSurface
+from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import (
     TopAbs_EDGE,
@@ -39,6 +40,7 @@ __all__ = [
     "enclosed_volume",
     "is_valid",
     "measure",
+    "measure_about",
     "parts_of",
     "sealed_shells",
     "topology",
@@ -202,6 +204,14 @@ def measure(shape: TopoDS_Shape) -> tuple[float, float]:
     volume, area = GProp_GProps(), GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, volume, _MEASURE)
     BRepGProp.SurfaceProperties_s(shape, area, _MEASURE)
+    return float(volume.Mass()), float(area.Mass())
+
+
+def measure_about(face: TopoDS_Shape, middle: NDArray[np.float64]) -> tuple[float, float]:
+    """Flux of (p - middle) / 3 through a face in mm3, and its area in mm2, as :func:`measure` of a closed shape."""
+    volume, area = GProp_GProps(gp_Pnt(*middle.tolist())), GProp_GProps()
+    BRepGProp.VolumeProperties_s(face, volume, _MEASURE)
+    BRepGProp.SurfaceProperties_s(face, area, _MEASURE)
     return float(volume.Mass()), float(area.Mass())
 
 

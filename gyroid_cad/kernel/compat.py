@@ -24,7 +24,7 @@ try:
     from OCP.collections import Sequence_TDF_Label as LabelSequence
 
     as_compound, as_edge, as_face = TopoDS.Compound, TopoDS.Edge, TopoDS.Face
-    as_shell, as_solid, as_vertex = TopoDS.Shell, TopoDS.Solid, TopoDS.Vertex
+    as_shell, as_solid, as_vertex, as_wire = TopoDS.Shell, TopoDS.Solid, TopoDS.Vertex, TopoDS.Wire
 except ImportError:
     from OCP.TColgp import TColgp_Array1OfPnt as PointArray
     from OCP.TColgp import TColgp_Array1OfPnt2d as Point2dArray
@@ -39,7 +39,7 @@ except ImportError:
     from OCP.TopTools import TopTools_MapOfShape as ShapeSet
 
     as_compound, as_edge, as_face = TopoDS.Compound_s, TopoDS.Edge_s, TopoDS.Face_s
-    as_shell, as_solid, as_vertex = TopoDS.Shell_s, TopoDS.Solid_s, TopoDS.Vertex_s
+    as_shell, as_solid, as_vertex, as_wire = TopoDS.Shell_s, TopoDS.Solid_s, TopoDS.Vertex_s, TopoDS.Wire_s
 
 __all__ = [
     "IntegerArray",
@@ -59,6 +59,7 @@ __all__ = [
     "as_shell",
     "as_solid",
     "as_vertex",
+    "as_wire",
     "kernel_origin",
 ]
 

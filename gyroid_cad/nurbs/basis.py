@@ -48,23 +48,27 @@ def basis(knots: Floats, degree: int, parameters: ArrayLike, derivative: int = 0
     """
     x = np.atleast_1d(np.asarray(parameters, float))
     count = len(knots) - degree - 1
+    functions = np.zeros((len(x), count))
     if derivative > degree:
-        return np.zeros((len(x), count))
+        return functions
     span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
-    functions = np.zeros((len(x), len(knots) - 1))
-    functions[np.arange(len(x)), span] = 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for p in range(1, degree + 1):
-            width = knots[p:] - knots[:-p]
-            inverse = np.where(width > 0, 1 / width, 0.0)
+    # Of each degree only those functions are held that do not vanish on the span: they are one more than the degree.
+    held = [np.ones(len(x))]
+    for p in range(1, degree + 1):
+        raised = [np.zeros(len(x)) for _ in range(p + 1)]
+        for i, function in enumerate(held):
+            low, high = knots[span + 1 - p + i], knots[span + 1 + i]
+            scaled = function / (high - low)
             if p > degree - derivative:
-                scaled = p * functions * inverse
-                functions = scaled[:, :-1] - scaled[:, 1:]
+                raised[i] -= p * scaled
+                raised[i + 1] += p * scaled
             else:
-                scaled = functions * inverse
-                rising = (x[:, np.newaxis] - knots[: -p - 1]) * scaled[:, :-1]
-                falling = (knots[p + 1 :] - x[:, np.newaxis]) * scaled[:, 1:]
-                functions = rising + falling
+                raised[i] += (high - x) * scaled
+                raised[i + 1] += (x - low) * scaled
+        held = raised
+    rows = np.arange(len(x))
+    for i, function in enumerate(held):
+        functions[rows, span - degree + i] = function
     return functions
 
 

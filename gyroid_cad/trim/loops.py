@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 
-__all__ = ["contains", "linked", "nested", "signed_area"]
+__all__ = ["contains", "decided", "linked", "nested", "signed_area"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 
 class _Link(Protocol):
@@ -85,3 +88,32 @@ def contains(outline: Floats, place: Floats) -> bool:
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = x - y * (next_x - x) / (next_y - y) > 0
     return bool(np.sum(crosses & beyond) % 2)
+
+
+def decided(
+    count: int, start: Integers, end: Integers, told: Booleans, ask: Callable[[Integers], Booleans]
+) -> Booleans:
+    """Return which of some corners are inside: those joined by an edge that nothing crosses are alike.
+
+    Parameters
+    ----------
+    count : int
+    start, end : ndarray of int
+        Of such edges.
+    told : ndarray of bool, shape (2, count)
+        Whether a crossing tells that a corner is outside, or inside.
+    ask : callable
+        For corners of which no crossing tells.
+    """
+    group = connected(count, start, end)
+    groups = int(group.max(initial=-1)) + 1
+    said = np.stack([np.bincount(group, told[k], groups) > 0 for k in (0, 1)])
+    if np.any(said.all(axis=0)):
+        raise KernelError("the crossings of lattice and part do not agree on what is inside")
+    inside = said[1]
+    unknown = np.flatnonzero(~said.any(axis=0))
+    if len(unknown):
+        first = np.full(groups, -1)
+        first[group[::-1]] = np.arange(count)[::-1]
+        inside[unknown] = ask(first[unknown])
+    return np.asarray(inside[group])

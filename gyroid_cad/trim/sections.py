@@ -19,7 +19,7 @@ from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, FacesToCut, plane_heights
 
-__all__ = ["Sections", "plane_sections", "section_knots"]
+__all__ = ["Sections", "on_section", "plane_sections", "section_knots"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -71,11 +71,11 @@ class Sections:
 
     def in_square(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
         """Places in the square, or their rate of change; shape (q, 2)."""
-        return _on_section(self.parameters[curve], t, derivative)
+        return on_section(self.parameters[curve], t, derivative)
 
     def in_space(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
         """Points in mm, or their rate of change; shape (q, 3)."""
-        return _on_section(self.points[curve], t, derivative)
+        return on_section(self.points[curve], t, derivative)
 
 
 @lru_cache
@@ -85,7 +85,8 @@ def section_knots(control_points: int) -> Floats:
     return np.concatenate([np.zeros(4), inner, np.ones(4)])
 
 
-def _on_section(control: Floats, t: Floats, derivative: int) -> Floats:
+def on_section(control: Floats, t: Floats, derivative: int = 0) -> Floats:
+    """Points of a curve through stations, or its rate of change, at parameters in [0, 1], from its control points."""
     return np.asarray(_section_basis(len(control), np.asarray(t, float).tobytes(), derivative) @ control)
 
 

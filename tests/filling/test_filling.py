@@ -15,10 +15,12 @@ from OCP.TopoDS import TopoDS_Shape
 from scipy.spatial.transform import Rotation
 
 import gyroid_cad.filling.part
+import gyroid_cad.filling.roads
 import gyroid_cad.kernel.regions
 from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError, SealedVoidsWarning
 from gyroid_cad.filling.fill import Filled, fill
-from gyroid_cad.filling.part import Filling, part_of
+from gyroid_cad.filling.part import part_of
+from gyroid_cad.filling.roads import Made
 from gyroid_cad.filling.wanted import KINDS
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure
@@ -144,12 +146,25 @@ def test_small_islands_of_the_bare_surface_are_told_by_their_area() -> None:
     assert made.area <= whole.area
 
 
+def only_by(monkeypatch: pytest.MonkeyPatch, wanted: str) -> None:
+    """Have every other road fail."""
+    every = gyroid_cad.filling.roads.taken
+
+    def taken(road: str, *arguments: Any) -> Any:
+        if road != wanted:
+            raise KernelError("touches")
+        return every(road, *arguments)
+
+    monkeypatch.setattr(gyroid_cad.filling.part, "taken", taken)
+
+
 def test_a_box_is_cut_without_booleans_and_comes_out_as_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
     box = cq.Workplane().box(4, 5, 3).translate((5, 4, 6))
     sections = fill(box, CELL, WALL, fit=COARSE).report
-    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill: self._by_booleans(infill))
+    only_by(monkeypatch, "booleans")
     booleans = fill(box, CELL, WALL, fit=COARSE).report
     assert sections.by_sections
+    assert not booleans.by_sections
     assert sections.volume == pytest.approx(booleans.volume, rel=1e-5)
     assert sections.area == pytest.approx(booleans.area, rel=1e-5)
     assert (sections.solids, sections.faces) == (booleans.solids, booleans.faces)
@@ -163,11 +178,8 @@ def test_small_boxes_at_the_origin_are_cut_as_large_ones_are(side: float) -> Non
     assert sum(report.volume for report in both) == pytest.approx(side**3, rel=1e-6)
 
 
-def test_a_box_that_cannot_be_cut_by_sections_goes_to_the_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(self: Filling, infill: Any) -> Any:
-        raise KernelError("touches")
-
-    monkeypatch.setattr(Filling, "_by_sections", failing)
+def test_a_box_that_cannot_be_cut_without_the_kernel_goes_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    only_by(monkeypatch, "booleans")
     report = fill(cq.Workplane().box(4, 5, 3).translate((5, 4, 6)), CELL, WALL, fit=COARSE).report
     assert not report.by_sections
     assert report.valid
@@ -248,7 +260,7 @@ def test_a_box_with_a_skin_is_cut_without_booleans_and_comes_out_as_with_them(mo
     sections, channels = (
         fill(box, CELL, WALL, kind=kind, fit=COARSE, skin=0.7).report for kind in ("sheet", "channels")
     )
-    monkeypatch.setattr(Filling, "_by_sections", lambda self, infill: self._by_booleans(infill))
+    only_by(monkeypatch, "booleans")
     booleans = fill(box, CELL, WALL, fit=COARSE, skin=0.7).report
     assert sections.by_sections
     assert sections.volume + channels.volume == pytest.approx(7 * 8 * 6, rel=1e-9)
@@ -363,7 +375,8 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
             raise KernelError("tangent")
         return split(*arguments)
 
-    monkeypatch.setattr(gyroid_cad.filling.part, "split_by_region", failing_once)
+    only_by(monkeypatch, "booleans")
+    monkeypatch.setattr(gyroid_cad.filling.roads, "split_by_region", failing_once)
     report = fill(peg(), CELL, WALL, fit=COARSE).report
     assert len(calls) == 2
     assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
@@ -372,9 +385,9 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
 
 @pytest.mark.parametrize("wrong", ["the part itself", "nothing"])
 def test_a_result_of_the_wrong_volume_is_never_handed_out(monkeypatch: pytest.MonkeyPatch, wrong: str) -> None:
-    solids = [peg().val().wrapped] if wrong == "the part itself" else []
-    monkeypatch.setattr(gyroid_cad.filling.part, "split_by_region", lambda *arguments: None)
-    monkeypatch.setattr(gyroid_cad.filling.part, "bounded_solids", lambda *arguments: solids)
+    solid = peg().val().wrapped
+    made = [Made(solid, *measure(solid))] if wrong == "the part itself" else []
+    monkeypatch.setattr(gyroid_cad.filling.part, "taken", lambda *arguments: ({"sheet": made}, 0, 0))
     with pytest.raises(KernelError, match=r"where about .* are expected; nor with the lattice shifted a little, twice"):
         fill(peg(), CELL, WALL, fit=COARSE)
 

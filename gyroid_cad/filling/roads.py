@@ -1,0 +1,220 @@
+"""Roads to what a lattice leaves in a part: a box's sections, crossings with any part, and the kernel's booleans.
+
+The first two know where faces cross from numbers alone; the kernel is asked where something touches, and to check.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.progress import Progress, report_progress
+from gyroid_cad.errors import KernelError
+from gyroid_cad.filling.extent import PartExtent
+from gyroid_cad.filling.infill import Infill
+from gyroid_cad.filling.wanted import Region
+from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
+from gyroid_cad.kernel.check import measure
+from gyroid_cad.kernel.crossed import crossed_pieces, sizes_of
+from gyroid_cad.kernel.part import Part
+from gyroid_cad.kernel.regions import split_by_region
+from gyroid_cad.kernel.skin import Hollow
+from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.split import Pieces, bounded_solids, connected_shells
+from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
+from gyroid_cad.trim.box import TrimmedWall, cut_to_box
+from gyroid_cad.trim.crossing import cross
+from gyroid_cad.trim.measures import boundary_measures, joined, lattice_measures, whole_measures
+from gyroid_cad.wall.covering import CROSSING, INSIDE
+
+__all__ = ["Job", "Made", "Road", "taken"]
+
+Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+Road = Literal["sections", "crossings", "booleans"]
+# Solids by the name of their region; patches that the part's boundary may cross; and those that lie wholly inside.
+Found = tuple[dict[str, list["Made"]], int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Made:
+    """A solid, or a shell of the bare surface, with its volume in mm3 and its area in mm2."""
+
+    shape: KernelShape
+    volume: float
+    area: float
+
+
+class Job(Protocol):
+    """A part to be filled, and with which regions of the lattice."""
+
+    @property
+    def part(self) -> Part: ...
+    @property
+    def hollow(self) -> Hollow | None: ...
+    @property
+    def core(self) -> Part: ...
+    @property
+    def regions(self) -> tuple[Region, ...]: ...
+    @property
+    def cell_size(self) -> float: ...
+    @property
+    def progress(self) -> Progress | None: ...
+    def timed(self, stage: str) -> AbstractContextManager[None]: ...
+
+
+def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) -> Found:
+    """Return the solids that a road leads to, how many patches were cut, and how many are whole.
+
+    Parameters
+    ----------
+    road : {"sections", "crossings", "booleans"}
+        Sections are of a box alone; the first two of endless lattices, for they cut no side walls.
+    job : Job
+    infill : Infill
+    processes : int, optional
+        For booleans.
+
+    Raises
+    ------
+    KernelError
+    """
+    if road == "sections":
+        return _by_sections(job, infill)
+    if road == "crossings":
+        try:
+            return _by_crossings(job, infill)
+        except np.linalg.LinAlgError as singular:
+            raise KernelError("an edge of the part lies along the lattice") from singular
+    return _by_booleans(job, infill, processes)
+
+
+def _by_sections(job: Job, infill: Infill) -> Found:
+    """Fill a box, whose sides are planes."""
+    box = job.core.box
+    assert box is not None
+    corner = (box.axes @ box.low)[np.newaxis]
+    made, cut, whole = {}, 0, 0
+    for region in job.regions:
+        # A skin and what is joined to it are the part less the voids that the lattice leaves in the core.
+        skinned = job.hollow is not None and not region.fluid
+        sides = [(side, backwards != skinned) for side, backwards in region.sides]
+        with job.timed("cut"):
+            filled = not region.surface and bool(infill.contains(region, corner)[0]) != skinned
+            left = cut_to_box(infill.wall, box, sides, job.cell_size, filled, capped=not region.surface)
+        with job.timed("solid"):
+            shapes = build_trimmed(left)
+        pieces = [
+            Made(shape, 0.0 if region.surface else float(volume), float(area))
+            for shape, volume, area in zip(shapes, left.volumes, left.areas, strict=True)
+        ]
+        made[region.name] = [_less(job.part, pieces)] if skinned else pieces
+        counted = _patches_of(left)
+        cut, whole = max(cut, counted[0]), max(whole, counted[1])
+    return made, cut, whole
+
+
+def _less(part: Part, voids: list[Made]) -> Made:
+    """The part less voids within it."""
+    volume, area = measure(part.shape)
+    shape = hollowed_by(part.shape, (void.shape for void in voids))
+    return Made(shape, volume - sum(void.volume for void in voids), area + sum(void.area for void in voids))
+
+
+def _patches_of(left: TrimmedWall) -> tuple[int, int]:
+    """Count the patches that a box cuts, and those that it leaves whole."""
+    cut = {
+        face.patch
+        for face in left.faces
+        if any(patch_edge < 0 for patch_edges in face.patch_edges for patch_edge in patch_edges)
+    }
+    return len(cut), len({face.patch for face in left.faces} - cut)
+
+
+def _by_crossings(job: Job, infill: Infill) -> Found:
+    """Fill any part: the curves in which the lattice crosses its boundary are found by number."""
+    with job.timed("cover"):
+        extent = PartExtent(job.core, job.cell_size)
+        sides = infill.sides(extent.clearance, job.core.contains)
+        read = read_boundary(job.core.shape)
+    crossing, inside = (np.flatnonzero(sides == side) for side in (CROSSING, INSIDE))
+    made = {region.name: _crossed(job, infill, region, read, crossing, inside) for region in job.regions}
+    return made, len(crossing), len(inside)
+
+
+def _crossed(
+    job: Job, infill: Infill, region: Region, read: ReadBoundary, crossing: NDArray[np.int64], inside: NDArray[np.int64]
+) -> list[Made]:
+    def in_region(points: Floats) -> Booleans:
+        return infill.contains(region, points)
+
+    with job.timed("cut"):
+        cut = cross(
+            infill.wall,
+            crossing,
+            region.sides,
+            read.boundary,
+            job.cell_size,
+            job.core.contains,
+            None if region.surface else in_region,
+            outer=job.hollow is not None,
+        )
+    whole = [(patch, side, backwards) for patch in inside.tolist() for side, backwards in region.sides]
+    with job.timed("solid"):
+        pieces, faces = crossed_pieces(cut, read, whole)
+        shapes = _joined(job, infill, region, pieces, faces)
+    with job.timed("measure"):
+        middle = (job.part.low + job.part.high) / 2
+        measures = joined(
+            lattice_measures(cut, middle),
+            boundary_measures(cut, [*cut.inner, *cut.outer], middle),
+            whole_measures(infill.wall, whole, middle),
+        )
+        sizes = sizes_of(shapes, [*pieces.inside, *pieces.boundary, *faces], measures, middle)
+    return [
+        Made(shape, 0.0 if region.surface else volume, area)
+        for shape, (volume, area) in zip(shapes, sizes, strict=True)
+    ]
+
+
+def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:
+    """Fill any part by the kernel's general fuse."""
+    with job.timed("cover"):
+        sides = infill.sides(PartExtent(job.core, job.cell_size).clearance, job.core.contains)
+    made = {}
+    for region in job.regions:
+        with job.timed("faces"):
+            faces = infill.faces(region)
+        cut, whole = (
+            [face for patch in np.flatnonzero(sides == side).tolist() for face in faces[patch]]
+            for side in (CROSSING, INSIDE)
+        )
+        with job.timed("split"):
+            pieces = split_by_region(
+                job.core, cut, processes, lambda done, count: report_progress(job.progress, "split", done, count)
+            )
+        with job.timed("join"):
+            shapes = _joined(job, infill, region, pieces, whole)
+        with job.timed("measure"):
+            made[region.name] = [
+                Made(shape, 0.0, measure(shape)[1]) if region.surface else Made(shape, *measure(shape))
+                for shape in shapes
+            ]
+    return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
+
+
+def _joined(job: Job, infill: Infill, region: Region, pieces: Pieces, whole: list[Any]) -> list[KernelShape]:
+    """Solids, or shells, that pieces of the lattice and of the part bound."""
+
+    def wanted_at(point: Floats) -> bool:
+        return bool(infill.contains(region, point[np.newaxis])[0])
+
+    if region.surface:
+        return list(connected_shells([*pieces.inside, *whole]))
+    if job.hollow is None or region.fluid:
+        return list(bounded_solids(pieces, whole, wanted_at))
+    return list(job.hollow.solids(pieces, whole, wanted_at))

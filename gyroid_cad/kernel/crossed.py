@@ -1,0 +1,287 @@
+"""Faces of the kernel that share their edges: of a lattice what a part leaves, and of its boundary what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.Geom2d import Geom2d_BSplineCurve
+from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Vertex, TopoDS_Wire
+
+from gyroid_cad.kernel.boundary import ReadBoundary
+from gyroid_cad.kernel.check import measure_about, parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, Point2dArray, as_edge, as_face
+from gyroid_cad.kernel.split import Change, Pieces
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
+from gyroid_cad.nurbs.surface import NurbsCurve
+from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops, Uses
+from gyroid_cad.trim.measures import Measures
+from gyroid_cad.trim.sections import section_knots
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["crossed_pieces", "sizes_of"]
+
+Floats = NDArray[np.float64]
+
+# Between what was measured between stations of a section curve and what the kernel finds elsewhere along it.
+_MARGIN = 2.0
+_CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
+
+
+def crossed_pieces(
+    cut: Crossing, read: ReadBoundary, whole: Iterable[tuple[int, int, bool]]
+) -> tuple[Pieces, list[TopoDS_Face]]:
+    """Pieces of a part and of a lattice's faces, and faces of the lattice that nothing has cut.
+
+    Parameters
+    ----------
+    cut : Crossing
+    read : ReadBoundary
+        Of the same boundary.
+    whole : iterable of (int, int, bool)
+        Patches and sides of further faces that lie in the part, and whether the region is on the side of the normal.
+
+    Returns
+    -------
+    pieces : Pieces
+    faces : list of TopoDS_Face
+    """
+    work = _Realisation(cut, read)
+    inside = [work.lattice_face(piece) for piece in cut.lattice]
+    boundary = [(piece, work.part_face(piece)) for piece in [*cut.inner, *cut.outer]]
+    faces = [work.whole_face(patch, side, backwards) for patch, side, backwards in whole]
+    pieces = Pieces(
+        tuple(inside), tuple(face for _, face in boundary), tuple(piece.face for piece, _ in boundary), work.changes()
+    )
+    return pieces, faces
+
+
+class _Realisation:
+    def __init__(self, cut: Crossing, read: ReadBoundary) -> None:
+        self.cut, self.read = cut, read
+        self.wall: Wall = cut.faces.wall
+        self.builder, self.geometry = BRep_Builder(), WallGeometry(self.wall)
+        self.complex = self.wall.complex
+        self.identity = TopLoc_Location()
+        self.vertices: dict[int, TopoDS_Vertex] = dict(enumerate(read.vertices))
+        self.fan_vertices: dict[int, TopoDS_Vertex] = {}
+        self.fan_of = {vertex: fan for fan, vertex in cut.fans.items()}
+        self.edges: dict[int, TopoDS_Edge] = {}
+        self.rims: dict[int, TopoDS_Edge] = {}
+        self.pieces_of: dict[int, list[tuple[float, int]]] = {}
+        self.patch_edges, self.patch_fans = self.complex.patch_edges.tolist(), self.complex.patch_fans.tolist()
+        self.forward = self.complex.edge_forward.tolist()
+        self.face_patch, self.face_side = cut.faces.patch.tolist(), cut.faces.side.tolist()
+        self.number_of = {edge: number for number, edge in enumerate(cut.edges)}
+
+    # Vertices -------------------------------------------------------------------------------------------------------
+
+    def vertex(self, number: int) -> TopoDS_Vertex:
+        if number in self.fan_of:
+            return self.fan_vertex(self.fan_of[number])
+        if number not in self.vertices:
+            self.vertices[number] = self._made_vertex(self.cut.points[number])
+        return self.vertices[number]
+
+    def fan_vertex(self, fan: int) -> TopoDS_Vertex:
+        if fan not in self.fan_vertices:
+            side, index = divmod(fan, self.complex.fan_count)
+            patch, corner = self._corner_of[index]
+            net = self.wall.nets[self.wall.patch_net[patch], side][_CORNERS[corner]]
+            self.fan_vertices[fan] = self._made_vertex(net + self.wall.shifts[self.wall.patch_shift[patch]])
+        return self.fan_vertices[fan]
+
+    @cached_property
+    def _corner_of(self) -> list[tuple[int, int]]:
+        """A patch and its corner at each fan."""
+        first = np.zeros(self.complex.fan_count, dtype=np.int64)
+        first[self.complex.patch_fans.ravel()] = np.arange(self.complex.patch_fans.size)
+        return [(patch, corner) for patch, corner in zip(*(some.tolist() for some in np.divmod(first, 4)), strict=True)]
+
+    def _made_vertex(self, point: Floats) -> TopoDS_Vertex:
+        vertex = TopoDS_Vertex()
+        self.builder.MakeVertex(vertex, gp_Pnt(*point.tolist()), TOLERANCE)
+        return vertex
+
+    # Edges ----------------------------------------------------------------------------------------------------------
+
+    def edge(self, number: int) -> TopoDS_Edge:
+        if number not in self.edges:
+            edge = self.cut.edges[number]
+            make = {"rim": self._rim_piece, "part": self._part_piece, "section": self._section_edge}[edge.kind]
+            self.edges[number] = make(edge)
+        return self.edges[number]
+
+    def rim(self, rim: int) -> TopoDS_Edge:
+        """All of a rim."""
+        if rim not in self.rims:
+            index = rim % self.complex.edge_count
+            side = rim // self.complex.edge_count
+            start, end = (side * self.complex.fan_count + self.complex.edge_fans[index]).tolist()
+            self.rims[rim] = self._on_rim(rim, self.fan_vertex(start), self.fan_vertex(end), -1.0, 1.0)
+        return self.rims[rim]
+
+    def _rim_piece(self, edge: CutEdge) -> TopoDS_Edge:
+        if edge.first == -1.0 and edge.last == 1.0:
+            return self.rim(edge.number)
+        return self._on_rim(edge.number, self.vertex(edge.start), self.vertex(edge.end), edge.first, edge.last)
+
+    def _on_rim(self, rim: int, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: float) -> TopoDS_Edge:
+        side, index = divmod(rim, self.complex.edge_count)
+        patch = int(self.complex.edge_patches[index, 0])
+        k = self.patch_edges[patch].index(index)
+        edge = TopoDS_Edge()
+        self.builder.MakeEdge(edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE)
+        return self._bounded(edge, start, end, first, last)
+
+    def _part_piece(self, edge: CutEdge) -> TopoDS_Edge:
+        own, whole = self.read.edges[edge.number], self.read.boundary.edges[edge.number]
+        if edge.first == whole.first and edge.last == whole.last:
+            return own
+        # The curves stay the part's own, in space and on both faces.
+        piece = as_edge(own.EmptyCopied())
+        self.builder.UpdateEdge(piece, _MARGIN * self.read.boundary.deviation(edge.number))
+        self.pieces_of.setdefault(edge.number, []).append((edge.first, self.number_of[edge]))
+        return self._bounded(piece, self.vertex(edge.start), self.vertex(edge.end), edge.first, edge.last)
+
+    def _section_edge(self, edge: CutEdge) -> TopoDS_Edge:
+        section = self.cut.sections[edge.number]
+        points = section.in_space
+        curve = kernel_curve(NurbsCurve(points, np.ones(len(points)), section_knots(len(points))))
+        made = TopoDS_Edge()
+        self.builder.MakeEdge(made, curve, self._tolerance(edge.number))
+        return self._bounded(made, self.vertex(edge.start), self.vertex(edge.end), 0.0, 1.0)
+
+    def _tolerance(self, section: int) -> float:
+        return max(TOLERANCE, _MARGIN * self.cut.sections[section].deviation)
+
+    def _bounded(
+        self, edge: TopoDS_Edge, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: float
+    ) -> TopoDS_Edge:
+        self.builder.Add(edge, start.Oriented(TopAbs_FORWARD))
+        self.builder.Add(edge, end.Oriented(TopAbs_REVERSED))
+        self.builder.Range(edge, first, last)
+        curve = BRepAdaptor_Curve(edge)
+        tolerance = BRep_Tool.Tolerance_s(edge)
+        for vertex, parameter in ((start, first), (end, last)):
+            # Two curves that meet in it need not do so exactly.
+            gap = _MARGIN * curve.Value(parameter).Distance(BRep_Tool.Pnt_s(vertex))
+            self.builder.UpdateVertex(vertex, max(tolerance, gap))
+        return edge
+
+    # Faces ----------------------------------------------------------------------------------------------------------
+
+    def lattice_face(self, piece: CutLoops) -> TopoDS_Face:
+        patch, side = self.face_patch[piece.face], self.face_side[piece.face]
+        surface, location = self.geometry.face(patch, side), self.geometry.location(patch)
+        made = TopoDS_Face()
+        self.builder.MakeFace(made, surface, location, TOLERANCE)
+        for loop in piece.loops:
+            for number, _ in loop:
+                edge = self.cut.edges[number]
+                if edge.kind == "rim":
+                    k = self.patch_edges[patch].index(edge.number % self.complex.edge_count)
+                    line, tolerance = self.geometry.border(patch, k), TOLERANCE
+                else:
+                    line, tolerance = (
+                        self._plane_curve(self.cut.sections[edge.number].in_square),
+                        self._tolerance(edge.number),
+                    )
+                self.builder.UpdateEdge(self.edge(number), line, surface, location, tolerance)
+            self.builder.Add(made, self._wire(loop))
+        self.builder.NaturalRestriction(made, piece.whole)
+        return as_face(made.Oriented(TopAbs_REVERSED)) if self.cut.backwards[piece.face] else made
+
+    def whole_face(self, patch: int, side: int, backwards: bool) -> TopoDS_Face:
+        surface, location = self.geometry.face(patch, side), self.geometry.location(patch)
+        made, wire = TopoDS_Face(), TopoDS_Wire()
+        self.builder.MakeFace(made, surface, location, TOLERANCE)
+        self.builder.MakeWire(wire)
+        for k, index in enumerate(self.patch_edges[patch]):
+            edge = self.rim(side * self.complex.edge_count + index)
+            self.builder.UpdateEdge(edge, self.geometry.border(patch, k), surface, location, TOLERANCE)
+            self.builder.Add(wire, edge if self.forward[patch][k] else edge.Reversed())
+        wire.Closed(True)
+        self.builder.Add(made, wire)
+        self.builder.NaturalRestriction(made, True)
+        return as_face(made.Oriented(TopAbs_REVERSED)) if backwards else made
+
+    def part_face(self, piece: CutLoops) -> TopoDS_Face:
+        own = self.read.faces[piece.face]
+        if piece.whole:
+            return own
+        location = TopLoc_Location()
+        surface = BRep_Tool.Surface_s(own, location)
+        made = TopoDS_Face()
+        self.builder.MakeFace(made, surface, location, BRep_Tool.Tolerance_s(own))
+        for loop in piece.loops:
+            for number, _ in loop:
+                edge = self.cut.edges[number]
+                if edge.kind == "section":
+                    curve = self._plane_curve(self.cut.sections[edge.number].on_part)
+                    self.builder.UpdateEdge(self.edge(number), curve, surface, location, self._tolerance(edge.number))
+            self.builder.Add(made, self._wire(loop))
+        return as_face(made.Oriented(own.Orientation()))
+
+    def _plane_curve(self, control: Floats) -> Geom2d_BSplineCurve:
+        poles = Point2dArray(1, len(control))
+        for index, place in enumerate(control.tolist(), 1):
+            poles.SetValue(index, gp_Pnt2d(*place))
+        return Geom2d_BSplineCurve(poles, *kernel_knots(section_knots(len(control))), 3)
+
+    def _wire(self, loop: Uses) -> TopoDS_Wire:
+        wire = TopoDS_Wire()
+        self.builder.MakeWire(wire)
+        for number, forward in loop:
+            edge = self.edge(number)
+            self.builder.Add(wire, edge if forward else edge.Reversed())
+        wire.Closed(True)
+        return wire
+
+    def changes(self) -> tuple[Change, ...]:
+        """Edges of the part that were parted, with their pieces in order."""
+        return tuple(
+            (self.read.edges[edge], tuple(self.edges[number] for _, number in sorted(pieces)))
+            for edge, pieces in self.pieces_of.items()
+        )
+
+
+def sizes_of(
+    solids: Iterable[TopoDS_Shape], faces: Iterable[TopoDS_Face], measures: Measures, middle: Floats
+) -> list[tuple[float, float]]:
+    """Volumes in mm3 and areas in mm2 of solids, from those of their faces; the kernel is asked for faces not given.
+
+    Parameters
+    ----------
+    solids : iterable of TopoDS_Shape
+    faces : iterable of TopoDS_Face
+        Oriented as they are measured.
+    measures : Measures
+        Of the faces, in that order.
+    middle : ndarray, shape (3,)
+        That the fluxes are taken about.
+    """
+    numbers, orientations = NumberedShapes(), []
+    for face in faces:
+        numbers.Add(face)
+        orientations.append(face.Orientation())
+    sizes = []
+    for solid in solids:
+        volume = area = 0.0
+        for face in parts_of(solid, TopAbs_FACE):
+            index = int(numbers.FindIndex(face)) - 1
+            if index >= 0:
+                sign = 1.0 if face.Orientation() == orientations[index] else -1.0
+                flux, size = sign * float(measures.flux[index]), float(measures.area[index])
+            else:
+                flux, size = measure_about(face, middle)
+            volume, area = volume + flux, area + size
+        sizes.append((volume, area))
+    return sizes

@@ -1,0 +1,398 @@
+"""A wall cut by a part: every vertex, edge and face of what is left of both, by number.
+
+Nodes are found on edges alone, curves are followed between them, and everything links up by number. Of the wall's faces
+what lies in the part is kept; of the part's, what lies in the region that the wall's faces bound, and the rest where it
+is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.trim.boundary import Boundary, BoundaryFace
+from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.ends import by_number, ends_of, halved
+from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, pairs_of
+from gyroid_cad.trim.loops import decided, linked, nested
+from gyroid_cad.trim.nodes import part_nodes, rim_nodes
+from gyroid_cad.trim.paths import closed_paths, open_paths
+from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["Crossing", "CutEdge", "CutLoops", "Uses", "cross"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+# In a control net.
+_CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
+# Points along an edge of an outline, by which holes are told from what is round them.
+_OUTLINE = 9
+
+Uses = list[tuple[int, bool]]
+
+
+@dataclass(frozen=True, slots=True)
+class CutEdge:
+    """An edge of what is left.
+
+    Attributes
+    ----------
+    start, end : int
+        Vertices.
+    first, last : float
+        Parameters of its curve there.
+    kind : {"rim", "part", "section"}
+    number : int
+        Of the rim (those of side 1 after those of side 0), of the part's edge, or of the section curve.
+    """
+
+    start: int
+    end: int
+    first: float
+    last: float
+    kind: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutLoops:
+    """A piece of a face, by its loops of edges, each with whether it is used the way it runs.
+
+    Attributes
+    ----------
+    face : int
+        Of the wall's faces, or of the part's.
+    loops : list
+        The outer one first; the piece lies on their left where the normal of the parameters points towards one.
+    whole : bool
+        Whether it is all of the face.
+    """
+
+    face: int
+    loops: list[Uses]
+    whole: bool
+
+
+@dataclass(eq=False)
+class Crossing:
+    """Pieces of a wall's faces in a part, and of the part's boundary in and beside the region they bound.
+
+    Attributes
+    ----------
+    faces : LatticeFaces
+    boundary : Boundary
+    pairs : Pairs
+    backwards : ndarray of bool, shape (faces,)
+        Of the wall's faces, whether the region lies on the side that the normal points to.
+    points : list of ndarray, shape (3,)
+        Vertices; the first are the part's own.
+    fans : dict
+        Vertices at corners of the wall's faces, by their fans; those of side 1 after those of side 0.
+    edges : list of CutEdge
+    sections : list of SectionCurve
+    lattice : list of CutLoops
+    inner, outer : list of CutLoops
+        Of the part's faces in the region, and beside it.
+    """
+
+    faces: LatticeFaces
+    boundary: Boundary
+    pairs: Pairs
+    backwards: Booleans
+    points: list[Floats] = field(default_factory=list)
+    fans: dict[int, int] = field(default_factory=dict)
+    edges: list[CutEdge] = field(default_factory=list)
+    sections: list[SectionCurve] = field(default_factory=list)
+    lattice: list[CutLoops] = field(default_factory=list)
+    inner: list[CutLoops] = field(default_factory=list)
+    outer: list[CutLoops] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class _Link:
+    start: Hashable
+    end: Hashable
+    edge: int
+    forward: bool
+
+
+def cross(
+    wall: Wall,
+    patches: Integers,
+    sides: Iterable[tuple[int, bool]],
+    boundary: Boundary,
+    cell_size: float,
+    in_part: Callable[[Floats], Booleans],
+    in_region: Callable[[Floats], Booleans] | None,
+    outer: bool = False,
+) -> Crossing:
+    """Cut faces of a wall and a part's boundary where they cross.
+
+    Parameters
+    ----------
+    wall : Wall
+    patches : ndarray of int, shape (patches,)
+        All that the boundary may cross.
+    sides : iterable of (int, bool)
+        Which faces of a patch bound the region, and whether against their normal.
+    boundary : Boundary
+    cell_size : float
+        In mm.
+    in_part, in_region : callable
+        Which of some points (n, 3) lie in the part, asked for what no curve tells of; and in the region, None if no
+        piece of the part's boundary is wanted.
+    outer : bool
+        Whether pieces of the part's boundary beside the region are wanted too.
+
+    Raises
+    ------
+    KernelError
+        If the two only touch somewhere, so that it is in doubt what to keep.
+    """
+    sides = list(sides)
+    faces = LatticeFaces(
+        wall, np.tile(patches, len(sides)), np.repeat([side for side, _ in sides], len(patches)).astype(np.int64)
+    )
+    backwards = np.repeat([back for _, back in sides], len(patches)).astype(bool)
+    made = Crossing(faces, boundary, pairs_of(faces, boundary), backwards)
+    work = _Work(made, wall, cell_size)
+    work.cut_lattice(in_part)
+    if in_region is not None:
+        work.cut_boundary(in_region, outer)
+    return made
+
+
+class _Work:
+    """Nodes and curves found, and the vertices and edges made of them."""
+
+    def __init__(self, made: Crossing, wall: Wall, cell_size: float) -> None:
+        self.made = made
+        complex, faces, pairs = wall.complex, made.faces, made.pairs
+        self.rims = faces.side[:, None] * complex.edge_count + complex.patch_edges[faces.patch]
+        self.fans = faces.side[:, None] * complex.fan_count + complex.patch_fans[faces.patch]
+        self.forward = complex.edge_forward[faces.patch]
+        self.rim_nodes = rim_nodes(pairs, self.rims, self.forward)
+        self.part_nodes = part_nodes(faces, made.boundary)
+        self.nodes_of_rim, self.nodes_of_edge = by_number(self.rim_nodes.rim), by_number(self.part_nodes.edge)
+        ends, self.coedges = ends_of(pairs, self.rims, self.forward, self.rim_nodes, self.part_nodes)
+        opened = open_paths(pairs, ends)
+        count = len(self.rim_nodes.rim) + len(self.part_nodes.edge)
+        closed, points = halved(closed_paths(pairs, opened), pairs, count)
+        for paths in (opened, closed):
+            sections, added = fitted_sections(pairs, paths, cell_size, count + len(points))
+            made.sections += sections
+            points += added
+        # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
+        self.first = len(made.boundary.vertices)
+        made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]
+        self.edge_numbers: dict[tuple[str, int, int], int] = {}
+        self.sections_of_face: dict[int, list[int]] = {}
+        self.sections_of_part: dict[int, list[int]] = {}
+        for number, section in enumerate(made.sections):
+            edge = self._edge("section", number, 0, self.first + section.start, self.first + section.end, 0.0, 1.0)
+            self.sections_of_face.setdefault(int(pairs.face[section.pair]), []).append(edge)
+            self.sections_of_part.setdefault(int(pairs.part[section.pair]), []).append(edge)
+
+    # The lattice ----------------------------------------------------------------------------------------------------
+
+    def cut_lattice(self, in_part: Callable[[Floats], Booleans]) -> None:
+        """Find the pieces of the wall's faces that lie in the part."""
+        fans, inside = self._fans_inside(in_part)
+        for face in range(len(self.made.faces)):
+            links: list[_Link] = []
+            cut = face in self.sections_of_face
+            for side in range(4):
+                rim, runs_on = int(self.rims[face, side]), bool(self.forward[face, side])
+                corners = int(self.fans[face, side]), int(self.fans[face, (side + 1) % 4])
+                first, last = corners if runs_on else corners[::-1]
+                begins_inside = bool(inside[np.searchsorted(fans, first)])
+                stretches = self._rim_stretches(rim, first, last, begins_inside)
+                cut |= rim in self.nodes_of_rim
+                links += [self._used(number, runs_on) for number in stretches]
+            links += [self._used(edge, True) for edge in self.sections_of_face.get(face, [])]
+            if not links:
+                continue
+            loops = linked(links, "a face of the lattice")
+            outlines = [np.concatenate([self._in_square(face, link) for link in loop]) for loop in loops]
+            for group in nested(outlines) if cut else [list(range(len(loops)))]:
+                uses = [[(link.edge, link.forward) for link in loops[index]] for index in group]
+                self.made.lattice.append(CutLoops(face, uses, not cut))
+
+    def _fans_inside(self, in_part: Callable[[Floats], Booleans]) -> tuple[Integers, Booleans]:
+        """Fans of the faces, and whether each lies in the part."""
+        fans, index = np.unique(self.fans.ravel(), return_inverse=True)
+        index = index.reshape(-1, 4)
+        start = np.where(self.forward, index, np.roll(index, -1, axis=1)).ravel()
+        end = np.where(self.forward, np.roll(index, -1, axis=1), index).ravel()
+        rims = self.rims.ravel()
+        crossed = np.isin(rims, self.rim_nodes.rim)
+        told = np.zeros((2, len(fans)), dtype=bool)
+        for rim, first, last in zip(
+            rims[crossed].tolist(), start[crossed].tolist(), end[crossed].tolist(), strict=True
+        ):
+            nodes = self.nodes_of_rim[rim]
+            told[int(not self.rim_nodes.inwards[nodes[0]]), first] = True
+            told[int(self.rim_nodes.inwards[nodes[-1]]), last] = True
+        corner = np.empty(len(fans), dtype=np.int64)
+        corner[index.ravel()] = np.arange(index.size)
+        face, which = np.divmod(corner, 4)
+        nets = self.made.faces.nets
+        self.corner_points = np.array(
+            [nets[f][_CORNERS[k]] for f, k in zip(face.tolist(), which.tolist(), strict=True)]
+        )
+        self.corner_fans = fans
+        inside = decided(
+            len(fans), start[~crossed], end[~crossed], told, lambda some: in_part(self.corner_points[some])
+        )
+        return fans, inside
+
+    def _rim_stretches(self, rim: int, first: int, last: int, inside: bool) -> list[int]:
+        """Edges of a rim that lie in the part."""
+        nodes = self.nodes_of_rim.get(rim, [])
+        stops = [-1.0, *self.rim_nodes.along[nodes].tolist(), 1.0]
+        vertices = [None, *(self.first + node for node in nodes), None]
+        kept = []
+        for k in range(len(stops) - 1):
+            if inside:
+                start, end = vertices[k], vertices[k + 1]
+                start = self._fan(first) if start is None else start
+                end = self._fan(last) if end is None else end
+                kept.append(self._edge("rim", rim, k, start, end, stops[k], stops[k + 1]))
+            if k < len(nodes):
+                if bool(self.rim_nodes.inwards[nodes[k]]) == inside:
+                    raise KernelError("a rim of the lattice comes into the part twice, and does not leave it between")
+                inside = not inside
+        return kept
+
+    def _fan(self, fan: int) -> int:
+        if fan not in self.made.fans:
+            self.made.fans[fan] = len(self.made.points)
+            self.made.points.append(self.corner_points[np.searchsorted(self.corner_fans, fan)])
+        return self.made.fans[fan]
+
+    def _in_square(self, face: int, link: _Link) -> Floats:
+        edge = self.made.edges[link.edge]
+        t = np.linspace(edge.first, edge.last, _OUTLINE)
+        t = (t if link.forward else t[::-1])[:-1]
+        if edge.kind == "section":
+            return self.made.sections[edge.number].square(t)
+        side = int(np.flatnonzero(self.rims[face] == edge.number)[0])
+        if not self.forward[face, side]:
+            t = -t
+        return np.stack(square_points(side, t), axis=-1)
+
+    # The part -------------------------------------------------------------------------------------------------------
+
+    def cut_boundary(self, in_region: Callable[[Floats], Booleans], outer: bool) -> None:
+        """Find the pieces of the part's faces in the region, and beside it."""
+        starts_inside = self._edges_inside(in_region)
+        stretches = [self._part_stretches(edge, inside) for edge, inside in enumerate(starts_inside.tolist())]
+        for number, face in enumerate(self.made.boundary.faces):
+            self._cut_face(number, face, stretches, True, self.made.inner)
+            if outer:
+                self._cut_face(number, face, stretches, False, self.made.outer)
+
+    def _leaves(self, node: int) -> bool:
+        """Tell whether an edge of the part leaves the region at a node."""
+        return bool(self.part_nodes.upwards[node] != self.made.backwards[self.part_nodes.face[node]])
+
+    def _edges_inside(self, in_region: Callable[[Floats], Booleans]) -> Booleans:
+        """Mask of the part's edges that lie in the region where they start."""
+        edges = self.made.boundary.edges
+        told = np.zeros((2, len(self.made.boundary.vertices)), dtype=bool)
+        for number, nodes in self.nodes_of_edge.items():
+            told[int(self._leaves(nodes[0])), edges[number].start] = True
+            told[int(not self._leaves(nodes[-1])), edges[number].end] = True
+        plain = [number for number in range(len(edges)) if number not in self.nodes_of_edge]
+        start, end = (np.array([getattr(edges[k], name) for k in plain], dtype=np.int64) for name in ("start", "end"))
+        inside = decided(told.shape[1], start, end, told, lambda some: in_region(self.made.boundary.vertices[some]))
+        return inside[[edge.start for edge in edges]]
+
+    def _part_stretches(self, edge: int, inside: bool) -> list[tuple[int, bool, Hashable, Hashable]]:
+        """Edges along one of the part's, whether each lies in the region, and nodes at its ends, None at corners."""
+        own = self.made.boundary.edges[edge]
+        nodes = self.nodes_of_edge.get(edge, [])
+        stops = [own.first, *self.part_nodes.along[nodes].tolist(), own.last]
+        first = self.first + len(self.rim_nodes.rim)
+        vertices = [own.start, *(first + node for node in nodes), own.end]
+        found: list[tuple[int, bool, Hashable, Hashable]] = []
+        for k in range(len(stops) - 1):
+            number = self._edge("part", edge, k, vertices[k], vertices[k + 1], stops[k], stops[k + 1])
+            found.append((number, inside, vertices[k] if k else None, vertices[k + 1] if k < len(nodes) else None))
+            if k < len(nodes):
+                if self._leaves(nodes[k]) != inside:
+                    raise KernelError("an edge of the part comes into the lattice twice, and does not leave it between")
+                inside = not inside
+        return found
+
+    def _cut_face(
+        self,
+        number: int,
+        face: BoundaryFace,
+        stretches: list[list[tuple[int, bool, Hashable, Hashable]]],
+        wanted: bool,
+        into: list[CutLoops],
+    ) -> None:
+        links: list[_Link] = []
+        whole, index = number not in self.sections_of_part, 0
+        for k, loop in enumerate(face.loops):
+            for position, coedge in enumerate(loop):
+                corners = (k, position), (k, (position + 1) % len(loop))
+                for edge, inside, start, end in stretches[coedge.edge]:
+                    whole &= inside == wanted and start is None and end is None
+                    if inside == wanted:
+                        first: Hashable = ("node", start, index) if start is not None else None
+                        last: Hashable = ("node", end, index) if end is not None else None
+                        if not coedge.forward:
+                            first, last = last, first
+                        links.append(_Link(first or corners[0], last or corners[1], edge, coedge.forward))
+                index += 1
+        for edge in self.sections_of_part.get(number, []):
+            section = self.made.sections[self.made.edges[edge].number]
+            forward = (bool(self.made.backwards[self.made.pairs.face[section.pair]]) == (face.sign > 0)) == wanted
+            ends = self._on_face(number, section.start, True), self._on_face(number, section.end, False)
+            links.append(_Link(*(ends if forward else ends[::-1]), edge, forward))
+        if not links:
+            return
+        loops = linked(links, "a face of the part")
+        groups = [list(range(len(loops)))]
+        if not whole:
+            groups = nested([np.concatenate([self._on_part(face, link) for link in loop]) for loop in loops])
+        for group in groups:
+            uses = [[(link.edge, link.forward) for link in loops[index]] for index in group]
+            into.append(CutLoops(number, uses, whole))
+
+    def _on_face(self, part: int, node: int, begins: bool) -> Hashable:
+        """A node of a section on a face of the part: of a coedge, if it lies on one."""
+        index = self.coedges.get((node, part, begins))
+        return ("node", self.first + node, index) if index is not None else ("inner", node)
+
+    def _on_part(self, face: BoundaryFace, link: _Link) -> Floats:
+        edge = self.made.edges[link.edge]
+        t = np.linspace(edge.first, edge.last, _OUTLINE)
+        t = (t if link.forward else t[::-1])[:-1]
+        if edge.kind == "section":
+            return self.made.sections[edge.number].part(t)
+        coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == link.forward)
+        return coedge.curve(t)[0]
+
+    # Edges ----------------------------------------------------------------------------------------------------------
+
+    def _used(self, number: int, forward: bool) -> _Link:
+        edge = self.made.edges[number]
+        ends = (edge.start, edge.end) if forward else (edge.end, edge.start)
+        return _Link(*ends, number, forward)
+
+    def _edge(self, kind: str, number: int, stretch: int, start: int, end: int, first: float, last: float) -> int:
+        key = (kind, number, stretch)
+        if key not in self.edge_numbers:
+            self.edge_numbers[key] = len(self.made.edges)
+            self.made.edges.append(CutEdge(start, end, first, last, kind, number))
+        return self.edge_numbers[key]

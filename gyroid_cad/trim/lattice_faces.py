@@ -1,0 +1,155 @@
+"""Faces of a wall near a part's boundary, in place, and which of the part's faces may cross each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot
+from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.nurbs.surface import edge_row, grid_points, point_derivatives
+from gyroid_cad.trim.boundary import Boundary
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["GRID", "LatticeFaces", "Pairs", "grouped", "pairs_of"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Places along each side of the square at which faces are looked at, and how many faces at a time.
+GRID = 33
+_AT_ONCE = 256
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeFaces:
+    """Some faces of a wall.
+
+    Attributes
+    ----------
+    wall : Wall
+    patch, side : ndarray of int, shape (faces,)
+    nets : ndarray, shape (faces, n, n, 3)
+        In mm, in place.
+    """
+
+    wall: Wall
+    patch: Integers
+    side: Integers
+
+    @cached_property
+    def nets(self) -> Floats:
+        """Control points in place, in mm; shape (faces, n, n, 3)."""
+        shifts = self.wall.shifts[self.wall.patch_shift[self.patch]]
+        return np.asarray(self.wall.nets[self.wall.patch_net[self.patch], self.side] + shifts[:, None, None])
+
+    def __len__(self) -> int:
+        return len(self.patch)
+
+    @property
+    def size(self) -> float:
+        """Largest extent of a face, in mm."""
+        return float(np.ptp(self.nets, axis=(1, 2)).max(initial=0.0))
+
+    def derivatives(self, face: Integers, u: Floats, v: Floats, order: int = 1) -> tuple[Floats, ...]:
+        """Points and derivatives of faces (m,) at parameters (m, q); each of shape (m, q, 3)."""
+        wall = self.wall
+        return point_derivatives(self.nets[face], wall.weights, (wall.knots, wall.knots), u, v, order)
+
+    def along_sides(self, faces: Integers, sides: Integers, along: Floats) -> Floats:
+        """Points of one side each of faces (m,), at parameters (q,) as one runs round the square; shape (m, q, 3)."""
+        wall = self.wall
+        points = np.empty((len(faces), len(along), 3))
+        for side in range(4):
+            rows = np.flatnonzero(sides == side)
+            weights = edge_row(wall.weights, side)
+            net = edge_row(np.moveaxis(self.nets[faces[rows]], 0, 2), side) * weights[:, None, None]
+            functions = basis(wall.knots if side < 2 else -wall.knots[::-1], 3, along)
+            points[rows] = np.moveaxis(np.tensordot(functions, net, 1), 1, 0) / (functions @ weights)[:, None]
+        return points
+
+    def on_grid(self, faces: Integers, count: int) -> Floats:
+        """Points on an even grid of parameters; shape (m, count, count, 3)."""
+        along, wall = np.linspace(-1, 1, count), self.wall
+        return grid_points(self.nets[faces], wall.weights, (wall.knots, wall.knots), along, along)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Faces of a wall with faces of a part that may cross them.
+
+    Attributes
+    ----------
+    faces : LatticeFaces
+    boundary : Boundary
+    face, part : ndarray of int, shape (pairs,)
+        Faces of the wall, in the order of their numbers, and of the part.
+    """
+
+    faces: LatticeFaces
+    boundary: Boundary
+    face: Integers
+    part: Integers
+
+    def heights(
+        self, pair: Integers, u: Floats, v: Floats, near: Floats | None = None
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Depths below the part's faces at places of the wall's, how they change, and the places that are nearest.
+
+        Parameters
+        ----------
+        pair : ndarray of int, shape (m,)
+        u, v : ndarray, shape (m, q)
+        near : ndarray, shape (m, q, 2), optional
+            Parameters of the part's faces near those looked for.
+
+        Returns
+        -------
+        heights : ndarray, shape (m, q)
+            In mm, positive inside.
+        slopes : ndarray, shape (m, q, 2)
+            Along u and v.
+        places : ndarray, shape (m, q, 2)
+            Parameters of the part's faces.
+        points : ndarray, shape (m, q, 3)
+        """
+        points, du, dv = self.faces.derivatives(self.face[pair], u, v)
+        heights, places, slopes = np.empty(u.shape), np.empty((*u.shape, 2)), np.empty((*u.shape, 2))
+        for part, rows in grouped(self.part[pair]):
+            face = self.boundary.faces[part]
+            guess = None if near is None else near[rows].reshape(-1, 2)
+            found, gradient, where = face.surface.distances(points[rows].reshape(-1, 3), guess)
+            inwards = -face.sign * gradient.reshape(*points[rows].shape)
+            heights[rows] = -face.sign * found.reshape(points[rows].shape[:2])
+            places[rows] = face.unwound(where, guess).reshape(*points[rows].shape[:2], 2)
+            slopes[rows] = np.stack([dot(du[rows], inwards), dot(dv[rows], inwards)], axis=-1)
+        return heights, slopes, places, points
+
+
+def pairs_of(faces: LatticeFaces, boundary: Boundary) -> Pairs:
+    """Find the pairs of faces whose boxes meet, and that are no further apart than the wall's face reaches."""
+    low, high = (reach(faces.nets, axis=(1, 2)) for reach in (np.min, np.max))
+    middle = faces.derivatives(np.arange(len(faces)), np.zeros((len(faces), 1)), np.zeros((len(faces), 1)), 0)[0][:, 0]
+    radius = np.linalg.norm(faces.nets - middle[:, None, None], axis=-1).max(axis=(1, 2))
+    found: list[tuple[Integers, Integers]] = []
+    for number, part in enumerate(boundary.faces):
+        near = np.flatnonzero(np.all((low <= part.high) & (high >= part.low), axis=1))
+        if len(near):
+            rough, error = part.surface.roughly(middle[near])
+            near = near[np.abs(rough) <= radius[near] + error]
+        found.append((near, np.full(len(near), number)))
+    face, part_of = (np.concatenate(some) for some in zip(*found, strict=True))
+    order = np.lexsort((part_of, face))
+    return Pairs(faces, boundary, face[order], part_of[order])
+
+
+def grouped(numbers: Integers) -> list[tuple[int, Integers]]:
+    """Distinct numbers, each with where it stands."""
+    if not len(numbers):
+        return []
+    order = np.argsort(numbers, kind="stable")
+    distinct, first = np.unique(numbers[order], return_index=True)
+    return list(zip(distinct.tolist(), np.split(order, first[1:]), strict=True))

@@ -1,0 +1,210 @@
+"""Fluxes and areas of what is left where a wall and a part cross, by Green's theorem along the borders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot
+from gyroid_cad.nurbs.basis import gauss_points
+from gyroid_cad.nurbs.quadrature import SquareQuadrature
+from gyroid_cad.trim.boundary import BoundaryFace
+from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops
+from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.section_fit import SectionCurve
+from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface, Swept
+from gyroid_cad.wall.offset import Wall
+
+__all__ = ["Measures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 64
+# Of a face of the part that is no plane, along each parameter.
+_SPANS, _MOST_SPANS = 12, 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measures:
+    """Of pieces of faces, where they are oriented outwards.
+
+    Attributes
+    ----------
+    flux : ndarray, shape (pieces,)
+        Of (p - middle) / 3 through each, in mm3: of a closed surface the volume in it.
+    area : ndarray, shape (pieces,)
+        In mm2.
+    """
+
+    flux: Floats
+    area: Floats
+
+
+def joined(*measures: Measures) -> Measures:
+    """Measures of several sets of pieces, one after the other."""
+    return Measures(*(np.concatenate([getattr(some, name) for some in measures]) for name in ("flux", "area")))
+
+
+def whole_measures(wall: Wall, whole: list[tuple[int, int, bool]], middle: Floats) -> Measures:
+    """Measure whole faces of a wall, by patch and side, and whether they are used against their normal."""
+    if not whole:
+        return Measures(np.zeros(0), np.zeros(0))
+    patch, side, backwards = (np.array(some) for some in zip(*whole, strict=True))
+    net = wall.patch_net[patch]
+    pairs, index = np.unique(np.stack([net, side]), axis=1, return_inverse=True)
+    sums = SquareQuadrature(wall.knots).over_square(wall.nets[pairs[0], pairs[1]], wall.weights)[index.ravel()]
+    shift = wall.shifts[wall.patch_shift[patch]] - middle
+    sign = np.where(backwards, -1.0, 1.0)
+    return Measures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
+
+
+def lattice_measures(cut: Crossing, middle: Floats) -> Measures:
+    """Measure the pieces of a wall's faces."""
+    wall, faces = cut.faces.wall, cut.faces
+    quadrature = SquareQuadrature(wall.knots)
+    densities: dict[tuple[int, int], Floats] = {}
+    flux, area = [], []
+    for piece in sorted(range(len(cut.lattice)), key=lambda k: _net_of(cut, cut.lattice[k])):
+        loops = cut.lattice[piece]
+        key = _net_of(cut, loops)
+        if key not in densities:
+            # Pieces come in the order of their nets, so that the samples of one are held at a time.
+            densities = {key: quadrature.densities(wall.nets[None, key[0], key[1]], wall.weights)[0]}
+        total = quadrature.over(*_square_border(cut, loops), densities[key])
+        shift = wall.shifts[wall.patch_shift[faces.patch[loops.face]]] - middle
+        sign = -1.0 if cut.backwards[loops.face] else 1.0
+        flux.append((piece, sign * (total[0] + shift @ total[1:4] / 3)))
+        area.append((piece, total[4]))
+    return Measures(_in_order(flux), _in_order(area))
+
+
+def _net_of(cut: Crossing, loops: CutLoops) -> tuple[int, int]:
+    return int(cut.faces.wall.patch_net[cut.faces.patch[loops.face]]), int(cut.faces.side[loops.face])
+
+
+def _in_order(found: list[tuple[int, float]]) -> Floats:
+    return np.array([value for _, value in sorted(found)])
+
+
+Stretch = tuple[Floats, Floats, Floats, Floats]
+
+
+def _square_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
+    """Places along a piece's border in the square, and weights times the rate of v."""
+    complex, patch = cut.faces.wall.complex, int(cut.faces.patch[piece.face])
+    sides = complex.patch_edges[patch].tolist()
+
+    def stretch(edge: CutEdge, forward: bool) -> Stretch:
+        if edge.kind == "section":
+            return _along(cut.sections[edge.number], SectionCurve.square)
+        side = sides.index(edge.number % complex.edge_count)
+        sign = 1.0 if complex.edge_forward[patch, side] else -1.0
+        # Of the other sides either the integral or the rate is 0.
+        pieces = _RIM_PIECES if side == 1 else 1
+        t, weights = gauss_points(np.linspace(edge.first, edge.last, pieces + 1), _PER_STRETCH)
+        places = np.stack(square_points(side, sign * t), axis=-1)
+        ends = np.stack(square_points(side, sign * np.array([edge.first, edge.last])), axis=-1)
+        rate = (0.0, 1.0, 0.0, -1.0)[side] * sign
+        return places, np.full(len(t), rate), weights, ends
+
+    return _border(cut, piece, stretch)
+
+
+def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], Stretch]) -> tuple[Floats, Floats]:
+    """Places along a piece's border, and weights times the rate of the second parameter.
+
+    Where two stretches meet, what is between their ends is part of the border too: an edge of the part need not quite
+    lie on its faces, and an integral from the far side would make much of that.
+    """
+    places, rates = [np.zeros((0, 2))], [np.zeros(0)]
+    for loop in piece.loops:
+        ends = []
+        for number, forward in loop:
+            place, rate, weights, both = stretch(cut.edges[number], forward)
+            places.append(place)
+            rates.append(weights * rate * (1 if forward else -1))
+            ends.append(both if forward else both[::-1])
+        starts, stops = np.array([both[0] for both in ends]), np.array([both[1] for both in ends])
+        following = np.roll(starts, -1, axis=0)
+        places.append((stops + following) / 2)
+        rates.append((following - stops)[:, 1])
+    return np.concatenate(places), np.concatenate(rates)
+
+
+def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> Measures:
+    """Measure pieces of the part's faces."""
+    flux, area = [], []
+    samples: tuple[int, _Samples] | None = None
+    for index in sorted(range(len(pieces)), key=lambda k: pieces[k].face):
+        face = cut.boundary.faces[pieces[index].face]
+        if samples is None or samples[0] != pieces[index].face:
+            samples = pieces[index].face, _Samples(face, middle)
+        places, rates = _part_border(cut, pieces[index])
+        total = samples[1].over(places, rates)
+        flux.append((index, face.sign * float(total[0])))
+        area.append((index, float(total[1])))
+    return Measures(_in_order(flux), _in_order(area))
+
+
+class _Samples:
+    """Densities of flux and area of a face of the part, sampled on a square in place of its parameters."""
+
+    def __init__(self, face: BoundaryFace, middle: Floats) -> None:
+        self.low, high = face.range
+        self.scale = (high - self.low) / 2
+        self.quadrature = SquareQuadrature(self._knots(face.surface))
+        nodes = self.quadrature.places
+        grid = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
+        places = self.low + self.scale * (grid + 1)
+        vectors, points = face.surface.area_vectors(places), face.surface.points(places)
+        flux, area = dot(points - middle, vectors) / 3, np.linalg.norm(vectors, axis=1)
+        self.density = np.stack([flux, area], axis=-1).reshape(len(nodes), len(nodes), 2) * np.prod(self.scale)
+
+    def _knots(self, surface: Surface) -> Floats:
+        """Knots on [-1, 1] along both parameters, such that the densities are smooth between them."""
+        if isinstance(surface, Quadric):
+            return np.linspace(-1, 1, 2 if surface.kind == "plane" else _SPANS + 1)
+        free = surface.free if isinstance(surface, Swept) else surface
+        assert isinstance(free, FreeForm)
+        own = np.concatenate(
+            [(breaks - low) / scale - 1 for breaks, low, scale in zip(free.breaks, self.low, self.scale, strict=True)]
+        )
+        # Knots of either parameter serve both; nearer than this they are one, and too many are left out.
+        knots = np.round(np.concatenate([own, np.linspace(-1, 1, _SPANS // 2 + 1)]), 9)
+        inner = np.unique(knots[(knots > -1 + 1e-4) & (knots < 1 - 1e-4)])
+        return np.concatenate([[-1.0], inner if len(inner) < _MOST_SPANS else np.linspace(-1, 1, 25)[1:-1], [1.0]])
+
+    def over(self, places: Floats, rates: Floats) -> Floats:
+        square = np.clip((places - self.low) / self.scale - 1, -1, 1)
+        return self.quadrature.over(square, rates / self.scale[1], self.density)
+
+
+def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
+    """Places along a piece's border on its face of the part, and weights times the rate of t."""
+    face = cut.boundary.faces[piece.face]
+
+    def stretch(edge: CutEdge, forward: bool) -> Stretch:
+        if edge.kind == "section":
+            return _along(cut.sections[edge.number], SectionCurve.part)
+        coedge = next(c for c in face.coedges if c.edge == edge.number and c.forward == forward)
+        t, weights = gauss_points(np.linspace(edge.first, edge.last, _PART_PIECES + 1), _PER_STRETCH)
+        places, rates, *_ = coedge.curve(np.concatenate([t, [edge.first, edge.last]]))
+        return places[:-2], rates[:-2, 1], weights, places[-2:]
+
+    return _border(cut, piece, stretch)
+
+
+def _along(section: SectionCurve, curve: Callable[..., Floats]) -> Stretch:
+    """Places and rates of a section curve at Gauss points between its stations, their weights, and its ends."""
+    t, weights = _gauss_between(len(section.in_space))
+    return curve(section, t), curve(section, t, 1)[:, 1], weights, curve(section, np.array([0.0, 1.0]))
+
+
+@lru_cache
+def _gauss_between(stations: int) -> tuple[Floats, Floats]:
+    return gauss_points(np.linspace(0, 1, stations), _PER_STRETCH)

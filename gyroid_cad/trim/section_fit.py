@@ -1,0 +1,231 @@
+"""Followed curves as splines: in the parameters of both faces and in space, with one parameter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.errors import KernelError
+from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.trim.lattice_faces import Pairs, grouped
+from gyroid_cad.trim.paths import Paths
+from gyroid_cad.trim.sections import on_section, section_knots
+
+__all__ = ["SectionCurve", "fitted_sections"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
+_STATIONS = (8, 16, 32, 64, 128)
+_CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
+_NEWTON_STEPS, _CONVERGED = 8, 1e-11
+# So many functions on either side of its own do not vanish at a station that is nearly in its even place.
+_BAND = 4
+# In steps between stations.
+_UNEVEN = 0.75
+# How far from its stations a curve in the square may swing between them, in the length of all.
+_WIDEST = 1.2
+_AT_ONCE = 256
+# How often a curve is parted that cannot be fitted, and of how many places each half then is.
+_PARTINGS, _HALF = 4, 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectionCurve:
+    """A curve in which a face of the wall crosses one of the part.
+
+    Attributes
+    ----------
+    pair : int
+    start, end : int
+        Nodes; -1 if it closes.
+    in_square, in_space, on_part : ndarray, shape (m, 2), (m, 3), (m, 2)
+        Control points on the knots of :func:`~gyroid_cad.trim.sections.section_knots`.
+    deviation : float
+        Of the three from each other, in mm.
+    """
+
+    pair: int
+    start: int
+    end: int
+    in_square: Floats
+    in_space: Floats
+    on_part: Floats
+    deviation: float
+
+    def square(self, t: Floats, derivative: int = 0) -> Floats:
+        """Places in the square at parameters in [0, 1], or their rate of change; shape (q, 2)."""
+        return on_section(self.in_square, t, derivative)
+
+    def part(self, t: Floats, derivative: int = 0) -> Floats:
+        """Parameters of the part's face, or their rate of change; shape (q, 2)."""
+        return on_section(self.on_part, t, derivative)
+
+
+def fitted_sections(
+    pairs: Pairs, paths: Paths, cell_size: float, first: int
+) -> tuple[list[SectionCurve], list[Floats]]:
+    """Fit curves that were followed, each with as few control points as keep the splines together.
+
+    One that is not close with the most control points is parted in two, a few times over: near the pole of a sphere a
+    curve turns about it within a fraction of its length.
+
+    Parameters
+    ----------
+    pairs : Pairs
+    paths : Paths
+    cell_size : float
+        In mm, by which closeness is measured.
+    first : int
+        The number that the first new node gets.
+
+    Returns
+    -------
+    sections : list of SectionCurve
+    points : list of ndarray, shape (3,)
+        Of new nodes.
+
+    Raises
+    ------
+    KernelError
+        If one is not close however often it is parted.
+    """
+    sections: list[SectionCurve] = []
+    points: list[Floats] = []
+    for parting in range(_PARTINGS + 1):
+        control, deviation = _closely(pairs, paths, cell_size)
+        far = ~(deviation <= _NEAR_ENOUGH * cell_size)
+        if np.any(far) and parting == _PARTINGS:
+            worst = float(deviation.max())
+            raise KernelError(f"a curve where the lattice crosses the part was fitted to {worst:.2g} mm only")
+        for path in np.flatnonzero(~far).tolist():
+            ends = int(paths.pair[path]), int(paths.start[path]), int(paths.end[path])
+            some = control[path]
+            sections.append(SectionCurve(*ends, some[:, :2], some[:, 2:5], some[:, 5:], float(deviation[path])))
+        if not np.any(far):
+            break
+        paths, added = _parted(pairs, paths, np.flatnonzero(far), first + len(points))
+        points += added
+    return sections, points
+
+
+def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats], Floats]:
+    """Control points, in the square, in space and on the part's face, and how far the three are apart."""
+    control: list[Floats] = [np.zeros((0, 7))] * len(paths.pair)
+    deviation = np.full(len(paths.pair), np.inf)
+    left = np.arange(len(paths.pair))
+    for count in _STATIONS:
+        for some in np.split(left, range(_AT_ONCE, len(left), _AT_ONCE)):
+            if len(some):
+                made, off = _fitted(pairs, paths, some, count)
+                for index, path in enumerate(some.tolist()):
+                    control[path], deviation[path] = made[index], off[index]
+        left = left[~(deviation[left] <= _CLOSE * cell_size)]
+        if not len(left):
+            break
+    return control, deviation
+
+
+def _parted(pairs: Pairs, paths: Paths, which: Integers, first: int) -> tuple[Paths, list[Floats]]:
+    """Some of the curves in two, where they are halfway, between nodes with numbers of their own; and those points."""
+    halves: list[tuple[int, int, int]] = []
+    places: list[Floats] = []
+    near: list[Floats] = []
+    points: list[Floats] = []
+    for path in which.tolist():
+        pair, start, end = int(paths.pair[path]), int(paths.start[path]), int(paths.end[path])
+        way = np.hstack([paths.places[path], paths.near[path]])
+        even = _spread(way, _run(way[:, :2]), np.linspace(0, 1, 2 * _HALF + 1))[np.newaxis]
+        found, even = _onto_curve(pairs, np.array([pair]), even, even[:, [0, -1]])
+        node = first + len(points)
+        points.append(found[0, _HALF])
+        halves += [(pair, start, node), (pair, node, end)]
+        for half in (slice(0, _HALF + 1), slice(_HALF, None)):
+            places.append(even[0, half, :2])
+            near.append(even[0, half, 2:])
+    numbers = np.array(halves, dtype=np.int64)
+    return Paths(numbers[:, 0], numbers[:, 1], numbers[:, 2], places, near), points
+
+
+def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Floats, Floats]:
+    """Control points, in the square, in space and on the part's face, and how far the three are apart."""
+    even = np.linspace(0, 1, count + 1)
+    pair = paths.pair[which]
+    ways = [np.hstack([paths.places[k], paths.near[k]]) for k in which.tolist()]
+    ends = np.array([[way[0], way[-1]] for way in ways])
+    stations = np.array([_spread(way, _run(way[:, :2]), even) for way in ways])
+    points, stations = _onto_curve(pairs, pair, stations, ends)
+    stations = np.array([_spread(way, _run(some), even) for way, some in zip(stations, points, strict=True)])
+    points, stations = _onto_curve(pairs, pair, stations, ends)
+    t = np.array([_run(some) for some in points])
+    through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(which), count + 1, count + 1)
+    # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney):
+    # nearly even ones do.
+    crowded = ~np.all(np.isfinite(t), axis=1)
+    crowded |= np.abs(t - even).max(axis=1) * count > _UNEVEN
+    through[crowded] = np.eye(count + 1)
+    control = _solved(through, np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1))
+    between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
+    astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
+    u, v = np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1)
+    exact = pairs.faces.derivatives(pairs.face[pair], u, v, 0)[0]
+    deviation = np.linalg.norm(exact - between[..., 2:5], axis=-1).max(axis=1)
+    for part, rows in grouped(pairs.part[pair]):
+        surface = pairs.boundary.faces[part].surface
+        on_part = surface.points(between[rows, :, 5:].reshape(-1, 2)).reshape(len(rows), -1, 3)
+        off = np.linalg.norm(on_part - between[rows, :, 2:5], axis=-1).max(axis=1)
+        deviation[rows] = np.maximum(deviation[rows], off)
+    return control, np.where(crowded | astray | ~np.isfinite(deviation), np.inf, deviation)
+
+
+def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) -> tuple[Floats, Floats]:
+    """Points of stations moved onto the curve, and those stations; the first and last are what they are."""
+    stations = stations.copy()
+    stations[:, [0, -1]] = ends
+    near = stations[..., 2:]
+    points = np.zeros((*stations.shape[:2], 3))
+    for _ in range(_NEWTON_STEPS):
+        heights, slopes, near, points = pairs.heights(pair, stations[..., 0], stations[..., 1], near)
+        steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
+        step = -slopes * (heights / steepness)[..., None]
+        step[:, [0, -1]] = 0
+        length = np.linalg.norm(step, axis=-1, keepdims=True)
+        if length.max(initial=0.0) < _CONVERGED:
+            break
+        stations[..., :2] += step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1))
+    stations[..., 2:] = near
+    return points, stations
+
+
+def _solved(through: Floats, values: Floats) -> Floats:
+    """Solutions of many systems at once, by elimination in the band that a spline's functions leave.
+
+    Without pivots, for a matrix of B-splines is totally positive (de Boor and Pinkus).
+    """
+    through, values = through.copy(), values.copy()
+    count = through.shape[1]
+    for k in range(count - 1):
+        rows, columns = slice(k + 1, k + 1 + _BAND), slice(k, k + 1 + 2 * _BAND)
+        factor = through[:, rows, k] / through[:, [k], k]
+        through[:, rows, columns] -= factor[..., None] * through[:, [k], columns]
+        values[:, rows] -= factor[..., None] * values[:, [k]]
+    for k in range(count - 1, -1, -1):
+        above = slice(k + 1, k + 1 + 2 * _BAND)
+        values[:, k] -= np.einsum("mj,mjc->mc", through[:, k, above], values[:, above])
+        values[:, k] /= through[:, k, k, None]
+    return values
+
+
+def _run(points: Floats) -> Floats:
+    """Length of the chords up to each point, in parts of all."""
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(run / run[-1])
+
+
+def _spread(way: Floats, run: Floats, t: Floats) -> Floats:
+    """Places of a way at parameters t, where its own points have parameters ``run``."""
+    return np.stack([np.interp(t, run, column) for column in way.T], axis=-1)

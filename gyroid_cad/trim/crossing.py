@@ -24,7 +24,7 @@ from gyroid_cad.trim.paths import closed_paths, open_paths
 from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Crossing", "CutEdge", "CutLoops", "Uses", "cross"]
+__all__ = ["Crossing", "CutEdge", "CutLoops", "Uses", "cross_part"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,6 +34,8 @@ Booleans = NDArray[np.bool_]
 _CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 # Points along an edge of an outline, by which holes are told from what is round them.
 _OUTLINE = 9
+# That are told of: nodes of rims and of edges, curves that end and that close, and their splines.
+_STEPS = 5
 
 Uses = list[tuple[int, bool]]
 
@@ -123,7 +125,7 @@ class _Link:
     forward: bool
 
 
-def cross(
+def cross_part(
     wall: Wall,
     patches: Integers,
     sides: Iterable[tuple[int, bool]],
@@ -132,6 +134,7 @@ def cross(
     in_part: Callable[[Floats], Booleans],
     in_region: Callable[[Floats], Booleans] | None,
     outer: bool = False,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Crossing:
     """Cut faces of a wall and a part's boundary where they cross.
 
@@ -150,6 +153,8 @@ def cross(
         piece of the part's boundary is wanted.
     outer : bool
         Whether pieces of the part's boundary beside the region are wanted too.
+    progress : callable, optional
+        Called with (steps done, steps in all).
 
     Raises
     ------
@@ -162,7 +167,8 @@ def cross(
     )
     backwards = np.repeat([back for _, back in sides], len(patches)).astype(bool)
     made = Crossing(faces, boundary, pairs_of(faces, boundary), backwards)
-    work = _Work(made, wall, cell_size)
+    steps = iter(range(1, _STEPS + 1))
+    work = _Work(made, wall, cell_size, lambda: progress and progress(next(steps), _STEPS))
     work.cut_lattice(in_part)
     if in_region is not None:
         work.cut_boundary(in_region, outer)
@@ -172,23 +178,28 @@ def cross(
 class _Work:
     """Nodes and curves found, and the vertices and edges made of them."""
 
-    def __init__(self, made: Crossing, wall: Wall, cell_size: float) -> None:
+    def __init__(self, made: Crossing, wall: Wall, cell_size: float, step_done: Callable[[], object]) -> None:
         self.made = made
         complex, faces, pairs = wall.complex, made.faces, made.pairs
         self.rims = faces.side[:, None] * complex.edge_count + complex.patch_edges[faces.patch]
         self.fans = faces.side[:, None] * complex.fan_count + complex.patch_fans[faces.patch]
         self.forward = complex.edge_forward[faces.patch]
         self.rim_nodes = rim_nodes(pairs, self.rims, self.forward)
+        step_done()
         self.part_nodes = part_nodes(faces, made.boundary)
+        step_done()
         self.nodes_of_rim, self.nodes_of_edge = by_number(self.rim_nodes.rim), by_number(self.part_nodes.edge)
         ends, self.coedges = ends_of(pairs, self.rims, self.forward, self.rim_nodes, self.part_nodes)
         opened = open_paths(pairs, ends)
+        step_done()
         count = len(self.rim_nodes.rim) + len(self.part_nodes.edge)
         closed, points = halved(closed_paths(pairs, opened), pairs, count)
+        step_done()
         for paths in (opened, closed):
             sections, added = fitted_sections(pairs, paths, cell_size, count + len(points))
             made.sections += sections
             points += added
+        step_done()
         # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
         self.first = len(made.boundary.vertices)
         made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]

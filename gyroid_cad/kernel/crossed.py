@@ -21,8 +21,8 @@ from gyroid_cad.kernel.compat import NumberedShapes, Point2dArray, as_edge, as_f
 from gyroid_cad.kernel.split import Change, Pieces
 from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
 from gyroid_cad.nurbs.surface import NurbsCurve
-from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.measures import PieceMeasures
+from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.wall.offset import Wall
 

@@ -55,8 +55,6 @@ class _Kind:
         return np.linspace(self.lowest, self.highest, self.bins + 1)
 
 
-# Of values that are one, in parts of the largest.
-_ALIKE = 1e-9
 # The bounds are those of CUBIT's manual (hexahedral and quadrilateral metrics), whose warpage is 1 less ours; that of
 # the ratio of determinants, which it does not have, is ours.
 _KINDS = {
@@ -206,9 +204,7 @@ def summary_of(name: str, values: Floats, bound: float, centres: Floats) -> Meas
     """
     kind = _KINDS[name]
     defined = values[values < NO_NUMBER]
-    # Of places that symmetry makes alike the first, whatever their last digits are.
-    badness = -values if kind.larger_is_better else values
-    worst = int(np.argmax(badness >= badness.max() - _ALIKE * max(1.0, float(np.abs(badness).max()))))
+    worst = int(np.argmin(values) if kind.larger_is_better else np.argmax(values))
     beyond = values < bound if kind.larger_is_better else values > bound
     inside = np.clip((defined - kind.lowest) / (kind.highest - kind.lowest) * kind.bins, 0, kind.bins - 1)
     return MeasureSummary(

@@ -5,7 +5,7 @@ offset, turned right side out where that hands it back inverted. Five cells a si
 our own untrimmed lattice. Ten: what the time and memory grow by; each of these in a process of its own, by the
 processor time of the filling alone. A ball and a bracket read from STEP: the volume against columns of points, the
 part's inside told by rays through a fine mesh of it, the wall by distance to dense samples of the exact surface; no
-boolean is asked.
+boolean is asked. And whole commands, by the clock.
 
 Run: ``python -m benchmarks.filling [--small]``; ``--small`` fills a part of a period, few
 cells and a small cylinder.
@@ -17,22 +17,34 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.TopoDS import TopoDS_Shape
 
 from benchmarks.memory import peak
 from benchmarks.solid_against_thickening import copies, thickened
 from benchmarks.subject import CELL_SIZE, THICKNESS, kernel_volume, sewn
-from benchmarks.timing import ROOT, Row, arguments_for, best_in_turn, fresh_python, plain_table, print_verdicts
+from benchmarks.timing import (
+    ROOT,
+    Row,
+    arguments_for,
+    best_in_turn,
+    fresh_python,
+    plain_table,
+    print_verdicts,
+    seconds_of_process,
+)
 from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.part import part_of
 from gyroid_cad.kernel.check import is_valid, topology
 from gyroid_cad.kernel.solid import build_solid
-from gyroid_cad.kernel.step import read_step
+from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.wall.complex import build_complex
@@ -54,6 +66,19 @@ _FINE, _COARSE = (200, 2e-3, 0.02), (16, 2e-2, 0.2)
 # Cells a side of the block, sides of the box in its middle in periods, and repeats.
 _PERIOD, _SMALL_BOX = (2, 1.0, 2), (1, 0.3, 1)
 _DENSE = 49
+_POINTS = 4096
+# Parts that others drew, if their folder is beside the project's.
+PARTS = ROOT.parent / "shared" / "parts"
+# Part, options, output, seconds at most, and better.
+_COMMANDS = (
+    ("plate", "--cell-size 6 --density 0.3", "plate_filled.step", 12, 6),
+    ("ball", "--cell-size 6 --density 0.3", "ball_filled.step", 8, 4),
+    ("cylinder", "--cell-size 3 --density 0.2+0.01*z --skin 0.5", "cylinder_filled.step", 90, 40),
+    ("cylinder", "--cell-size 3 --density 0.2+0.01*z --skin 0.5", "cylinder_filled.stl", 20, 8),
+    ("threaded", "--cell-size 6.5 --density 0.3", "threaded_filled.step", 60, 20),
+    ("nozzle_band", "--cell-size 6 --density 0.3", "nozzle_filled.step", 60, 20),
+)
+_SMALL_COMMANDS = (("pin", "--cell-size 8 --density 0.3", "pin_filled.step", None, None),)
 
 
 def main(arguments: Sequence[str] = ()) -> bool:
@@ -61,7 +86,49 @@ def main(arguments: Sequence[str] = ()) -> bool:
     small = arguments_for("Fill boxes, a ball and a bracket.").parse_args(arguments).small
     rows = [*_against_offset(*(_SMALL_BOX if small else _PERIOD)), *_many_cells(1 if small else 5)]
     passed = print_verdicts("Boxes", rows)
+    passed &= print_verdicts("Whole commands, file written and checked", [*_commands(small), *_inside(small)])
     return print_verdicts("Free forms", _free_forms(small)) and passed
+
+
+def _commands(small: bool) -> list[Row]:
+    """Commands as a user gives them, by the clock."""
+    rows = []
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for part, shape in _made().items():
+            write_step(shape, folder / f"{part}.step")
+        for part, options, output, required, aim in _SMALL_COMMANDS if small else _COMMANDS:
+            file = PARTS / f"{part}.step" if part in ("threaded", "nozzle_band") else folder / f"{part}.step"
+            if file.exists():
+                asked = ["fill", str(file), "-o", output, *options.split(), "--quiet"]
+                seconds = seconds_of_process("-m", "gyroid_cad", *asked, folder=folder)
+                rows.append(Row(f"fill {part}.step -o {output} {options}", seconds, required, aim, " s"))
+    return rows
+
+
+def _made() -> dict[str, TopoDS_Shape]:
+    plate = BRepPrimAPI_MakeBox(40.0, 25.0, 8.0).Shape()
+    for x in (8.0, 32.0):
+        hole = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(x, 12.5, -1.0), gp_Dir(0, 0, 1)), 3.0, 10.0).Shape()
+        plate = BRepAlgoAPI_Cut(plate, hole).Shape()
+    return {
+        "plate": plate,
+        "ball": BRepPrimAPI_MakeSphere(12.0).Shape(),
+        "cylinder": BRepPrimAPI_MakeCylinder(10.0, 20.0).Shape(),
+        "pin": BRepPrimAPI_MakeCylinder(2.0, 3.0).Shape(),
+    }
+
+
+def _inside(small: bool) -> list[Row]:
+    """Deciding of which points lie in a part, the reading of it not counted."""
+    file = PARTS / "threaded.step"
+    if small or not file.exists():
+        return []
+    part = part_of(file)
+    points = np.random.default_rng(0).uniform(part.low, part.high, (_POINTS, 3))
+    start = time.perf_counter()
+    part.contains(points)
+    return [Row(f"{_POINTS} points in {file.name}", time.perf_counter() - start, 2, unit=" s")]
 
 
 def _against_offset(cells: int, side: float, repeats: int) -> list[Row]:

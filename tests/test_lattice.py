@@ -209,7 +209,7 @@ def test_several_files_are_written_at_once(cell: Lattice, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("names", "settings", "words"),
     [
-        (["good.step", "bad.obj"], {}, "bad.obj"),
+        (["good.step", "bad.dxf"], {}, "bad.dxf"),
         (["good.step", "missing/bad.step"], {}, "existing folder"),
         (["good.step", "good.step"], {}, "each file once"),
         (["good.step"], {"schema": "ap203"}, "ap214 or ap242"),

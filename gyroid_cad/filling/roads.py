@@ -27,7 +27,7 @@ from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.kernel.split import Pieces, bounded_solids, connected_shells
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
-from gyroid_cad.trim.crossing import cross
+from gyroid_cad.trim.crossing import cross_part
 from gyroid_cad.trim.measures import boundary_measures, joined, lattice_measures, whole_measures
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
@@ -153,7 +153,7 @@ def _crossed(
         return infill.contains(region, points)
 
     with job.timed("cut"):
-        cut = cross(
+        cut = cross_part(
             infill.wall,
             crossing,
             region.sides,
@@ -162,6 +162,7 @@ def _crossed(
             job.core.contains,
             None if region.surface else in_region,
             outer=job.hollow is not None,
+            progress=lambda done, count: report_progress(job.progress, "cut", done, count),
         )
     whole = [(patch, side, backwards) for patch in inside.tolist() for side, backwards in region.sides]
     with job.timed("solid"):

@@ -40,7 +40,7 @@ from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.basis import orders, quotients
 from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
-from gyroid_cad.trim.surfaces import FreeForm, Quadric, QuadricKind, Surface, Swept
+from gyroid_cad.trim.surfaces import FreeForm, PartSurface, Quadric, QuadricKind, Swept
 
 __all__ = ["ReadBoundary", "read_boundary"]
 
@@ -136,7 +136,7 @@ def _edge(edge: TopoDS_Edge, vertices: NumberedShapes) -> BoundaryEdge:
     return BoundaryEdge(curve, first, last, start, end, BRep_Tool.Tolerance_s(edge))
 
 
-def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> Surface:
+def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> PartSurface:
     kind = adaptor.GetType()
     if (simple := _QUADRICS.get(kind)) is not None:
         name, get, sizes = simple

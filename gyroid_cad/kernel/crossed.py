@@ -21,8 +21,8 @@ from gyroid_cad.kernel.compat import NumberedShapes, Point2dArray, as_edge, as_f
 from gyroid_cad.kernel.split import Change, Pieces
 from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
 from gyroid_cad.nurbs.surface import NurbsCurve
-from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops, Uses
-from gyroid_cad.trim.measures import Measures
+from gyroid_cad.trim.measures import PieceMeasures
+from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.wall.offset import Wall
 
@@ -254,7 +254,7 @@ class _Realisation:
 
 
 def sizes_of(
-    solids: Iterable[TopoDS_Shape], faces: Iterable[TopoDS_Face], measures: Measures, middle: Floats
+    solids: Iterable[TopoDS_Shape], faces: Iterable[TopoDS_Face], measures: PieceMeasures, middle: Floats
 ) -> list[tuple[float, float]]:
     """Volumes in mm3 and areas in mm2 of solids, from those of their faces; the kernel is asked for faces not given.
 
@@ -263,7 +263,7 @@ def sizes_of(
     solids : iterable of TopoDS_Shape
     faces : iterable of TopoDS_Face
         Oriented as they are measured.
-    measures : Measures
+    measures : PieceMeasures
         Of the faces, in that order.
     middle : ndarray, shape (3,)
         That the fluxes are taken about.

@@ -288,8 +288,6 @@ def _solids(shells: Sequence[TopoDS_Shell]) -> list[TopoDS_Solid]:
         solid = TopoDS_Solid()
         builder.MakeSolid(solid)
         builder.Add(solid, shell)
-        if len(shells) == 1:
-            return [solid]
         classifier = BRepClass3d_SolidClassifier(solid)
         classifier.PerformInfinitePoint(_CLASSIFYING_TOLERANCE)
         if classifier.State() == TopAbs_IN:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.surfaces import Surface
+from gyroid_cad.trim.surfaces import PartSurface
 
 __all__ = ["Boundary", "BoundaryEdge", "BoundaryFace", "Coedge"]
 
@@ -105,7 +105,7 @@ class BoundaryFace:
 
     Attributes
     ----------
-    surface : Surface
+    surface : PartSurface
     sign : float
         1 where the normal of the parameters points out of the part, else -1.
     loops : list of list of Coedge
@@ -116,7 +116,7 @@ class BoundaryFace:
         Of a box round it, in mm.
     """
 
-    surface: Surface
+    surface: PartSurface
     sign: float
     loops: list[list[Coedge]]
     periods: tuple[float, float]

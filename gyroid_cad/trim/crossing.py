@@ -8,7 +8,7 @@ is asked for.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,15 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.boundary import Boundary, BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.ends import by_number, ends_of, halved
-from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, pairs_of
+from gyroid_cad.trim.lattice_faces import LatticeFaces, pairs_of
 from gyroid_cad.trim.loops import decided, linked, nested
 from gyroid_cad.trim.nodes import part_nodes, rim_nodes
 from gyroid_cad.trim.paths import closed_paths, open_paths
-from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
+from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
+from gyroid_cad.trim.section_fit import fitted_sections
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Crossing", "CutEdge", "CutLoops", "Uses", "cross"]
+__all__ = ["cross_part"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,85 +35,8 @@ Booleans = NDArray[np.bool_]
 _CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 # Points along an edge of an outline, by which holes are told from what is round them.
 _OUTLINE = 9
-
-Uses = list[tuple[int, bool]]
-
-
-@dataclass(frozen=True, slots=True)
-class CutEdge:
-    """An edge of what is left.
-
-    Attributes
-    ----------
-    start, end : int
-        Vertices.
-    first, last : float
-        Parameters of its curve there.
-    kind : {"rim", "part", "section"}
-    number : int
-        Of the rim (those of side 1 after those of side 0), of the part's edge, or of the section curve.
-    """
-
-    start: int
-    end: int
-    first: float
-    last: float
-    kind: str
-    number: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CutLoops:
-    """A piece of a face, by its loops of edges, each with whether it is used the way it runs.
-
-    Attributes
-    ----------
-    face : int
-        Of the wall's faces, or of the part's.
-    loops : list
-        The outer one first; the piece lies on their left where the normal of the parameters points towards one.
-    whole : bool
-        Whether it is all of the face.
-    """
-
-    face: int
-    loops: list[Uses]
-    whole: bool
-
-
-@dataclass(eq=False)
-class Crossing:
-    """Pieces of a wall's faces in a part, and of the part's boundary in and beside the region they bound.
-
-    Attributes
-    ----------
-    faces : LatticeFaces
-    boundary : Boundary
-    pairs : Pairs
-    backwards : ndarray of bool, shape (faces,)
-        Of the wall's faces, whether the region lies on the side that the normal points to.
-    points : list of ndarray, shape (3,)
-        Vertices; the first are the part's own.
-    fans : dict
-        Vertices at corners of the wall's faces, by their fans; those of side 1 after those of side 0.
-    edges : list of CutEdge
-    sections : list of SectionCurve
-    lattice : list of CutLoops
-    inner, outer : list of CutLoops
-        Of the part's faces in the region, and beside it.
-    """
-
-    faces: LatticeFaces
-    boundary: Boundary
-    pairs: Pairs
-    backwards: Booleans
-    points: list[Floats] = field(default_factory=list)
-    fans: dict[int, int] = field(default_factory=dict)
-    edges: list[CutEdge] = field(default_factory=list)
-    sections: list[SectionCurve] = field(default_factory=list)
-    lattice: list[CutLoops] = field(default_factory=list)
-    inner: list[CutLoops] = field(default_factory=list)
-    outer: list[CutLoops] = field(default_factory=list)
+# That are told of: nodes of rims and of edges, curves that end and that close, and their splines.
+_STEPS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +47,7 @@ class _Link:
     forward: bool
 
 
-def cross(
+def cross_part(
     wall: Wall,
     patches: Integers,
     sides: Iterable[tuple[int, bool]],
@@ -132,6 +56,7 @@ def cross(
     in_part: Callable[[Floats], Booleans],
     in_region: Callable[[Floats], Booleans] | None,
     outer: bool = False,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Crossing:
     """Cut faces of a wall and a part's boundary where they cross.
 
@@ -150,6 +75,8 @@ def cross(
         piece of the part's boundary is wanted.
     outer : bool
         Whether pieces of the part's boundary beside the region are wanted too.
+    progress : callable, optional
+        Called with (steps done, steps in all).
 
     Raises
     ------
@@ -162,7 +89,8 @@ def cross(
     )
     backwards = np.repeat([back for _, back in sides], len(patches)).astype(bool)
     made = Crossing(faces, boundary, pairs_of(faces, boundary), backwards)
-    work = _Work(made, wall, cell_size)
+    steps = iter(range(1, _STEPS + 1))
+    work = _Work(made, wall, cell_size, lambda: progress and progress(next(steps), _STEPS))
     work.cut_lattice(in_part)
     if in_region is not None:
         work.cut_boundary(in_region, outer)
@@ -172,23 +100,28 @@ def cross(
 class _Work:
     """Nodes and curves found, and the vertices and edges made of them."""
 
-    def __init__(self, made: Crossing, wall: Wall, cell_size: float) -> None:
+    def __init__(self, made: Crossing, wall: Wall, cell_size: float, step_done: Callable[[], object]) -> None:
         self.made = made
         complex, faces, pairs = wall.complex, made.faces, made.pairs
         self.rims = faces.side[:, None] * complex.edge_count + complex.patch_edges[faces.patch]
         self.fans = faces.side[:, None] * complex.fan_count + complex.patch_fans[faces.patch]
         self.forward = complex.edge_forward[faces.patch]
         self.rim_nodes = rim_nodes(pairs, self.rims, self.forward)
+        step_done()
         self.part_nodes = part_nodes(faces, made.boundary)
+        step_done()
         self.nodes_of_rim, self.nodes_of_edge = by_number(self.rim_nodes.rim), by_number(self.part_nodes.edge)
         ends, self.coedges = ends_of(pairs, self.rims, self.forward, self.rim_nodes, self.part_nodes)
         opened = open_paths(pairs, ends)
+        step_done()
         count = len(self.rim_nodes.rim) + len(self.part_nodes.edge)
         closed, points = halved(closed_paths(pairs, opened), pairs, count)
+        step_done()
         for paths in (opened, closed):
             sections, added = fitted_sections(pairs, paths, cell_size, count + len(points))
             made.sections += sections
             points += added
+        step_done()
         # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
         self.first = len(made.boundary.vertices)
         made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]

@@ -13,13 +13,13 @@ from gyroid_cad.common.arrays import dot
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
-from gyroid_cad.trim.crossing import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve
-from gyroid_cad.trim.surfaces import FreeForm, Quadric, Surface, Swept
+from gyroid_cad.trim.surfaces import FreeForm, PartSurface, Quadric, Swept
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["Measures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
+__all__ = ["PieceMeasures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,7 +30,7 @@ _SPANS, _MOST_SPANS = 12, 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measures:
+class PieceMeasures:
     """Of pieces of faces, where they are oriented outwards.
 
     Attributes
@@ -45,25 +45,25 @@ class Measures:
     area: Floats
 
 
-def joined(*measures: Measures) -> Measures:
-    """Measures of several sets of pieces, one after the other."""
-    return Measures(*(np.concatenate([getattr(some, name) for some in measures]) for name in ("flux", "area")))
+def joined(*measures: PieceMeasures) -> PieceMeasures:
+    """PieceMeasures of several sets of pieces, one after the other."""
+    return PieceMeasures(*(np.concatenate([getattr(some, name) for some in measures]) for name in ("flux", "area")))
 
 
-def whole_measures(wall: Wall, whole: list[tuple[int, int, bool]], middle: Floats) -> Measures:
+def whole_measures(wall: Wall, whole: list[tuple[int, int, bool]], middle: Floats) -> PieceMeasures:
     """Measure whole faces of a wall, by patch and side, and whether they are used against their normal."""
     if not whole:
-        return Measures(np.zeros(0), np.zeros(0))
+        return PieceMeasures(np.zeros(0), np.zeros(0))
     patch, side, backwards = (np.array(some) for some in zip(*whole, strict=True))
     net = wall.patch_net[patch]
     pairs, index = np.unique(np.stack([net, side]), axis=1, return_inverse=True)
     sums = SquareQuadrature(wall.knots).over_square(wall.nets[pairs[0], pairs[1]], wall.weights)[index.ravel()]
     shift = wall.shifts[wall.patch_shift[patch]] - middle
     sign = np.where(backwards, -1.0, 1.0)
-    return Measures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
+    return PieceMeasures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
 
 
-def lattice_measures(cut: Crossing, middle: Floats) -> Measures:
+def lattice_measures(cut: Crossing, middle: Floats) -> PieceMeasures:
     """Measure the pieces of a wall's faces."""
     wall, faces = cut.faces.wall, cut.faces
     quadrature = SquareQuadrature(wall.knots)
@@ -80,7 +80,7 @@ def lattice_measures(cut: Crossing, middle: Floats) -> Measures:
         sign = -1.0 if cut.backwards[loops.face] else 1.0
         flux.append((piece, sign * (total[0] + shift @ total[1:4] / 3)))
         area.append((piece, total[4]))
-    return Measures(_in_order(flux), _in_order(area))
+    return PieceMeasures(_in_order(flux), _in_order(area))
 
 
 def _net_of(cut: Crossing, loops: CutLoops) -> tuple[int, int]:
@@ -136,7 +136,7 @@ def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], S
     return np.concatenate(places), np.concatenate(rates)
 
 
-def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> Measures:
+def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> PieceMeasures:
     """Measure pieces of the part's faces."""
     flux, area = [], []
     samples: tuple[int, _Samples] | None = None
@@ -148,7 +148,7 @@ def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> 
         total = samples[1].over(places, rates)
         flux.append((index, face.sign * float(total[0])))
         area.append((index, float(total[1])))
-    return Measures(_in_order(flux), _in_order(area))
+    return PieceMeasures(_in_order(flux), _in_order(area))
 
 
 class _Samples:
@@ -165,7 +165,7 @@ class _Samples:
         flux, area = dot(points - middle, vectors) / 3, np.linalg.norm(vectors, axis=1)
         self.density = np.stack([flux, area], axis=-1).reshape(len(nodes), len(nodes), 2) * np.prod(self.scale)
 
-    def _knots(self, surface: Surface) -> Floats:
+    def _knots(self, surface: PartSurface) -> Floats:
         """Knots on [-1, 1] along both parameters, such that the densities are smooth between them."""
         if isinstance(surface, Quadric):
             return np.linspace(-1, 1, 2 if surface.kind == "plane" else _SPANS + 1)

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from gyroid_cad.common.arrays import dot, unit
 from gyroid_cad.nurbs.roots import foot_step
 
-__all__ = ["FreeForm", "Quadric", "QuadricKind", "Surface", "Swept"]
+__all__ = ["FreeForm", "PartSurface", "Quadric", "QuadricKind", "Swept"]
 
 Floats = NDArray[np.float64]
 QuadricKind = Literal["plane", "cylinder", "cone", "sphere", "torus"]
@@ -34,7 +34,7 @@ _BENT = 1e-2
 _IN_PLANE = 1e-9
 
 
-class Surface(Protocol):
+class PartSurface(Protocol):
     """A surface with parameters s and t, and what is known of any place near it."""
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
@@ -83,7 +83,7 @@ class Quadric:
     second: float = 0.0
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         own = (points - self.origin) @ self.axes.T
         x, y, z = own.T
         if self.kind == "plane":
@@ -109,12 +109,12 @@ class Quadric:
         return sign * found, sign * gradient @ self.axes, np.stack([angle, height], axis=-1)
 
     def roughly(self, points: Floats) -> tuple[Floats, Floats]:
-        """As of :class:`Surface`: exact."""
+        """As of :class:`PartSurface`: exact."""
         found = self.distances(points)[0]
         return found, np.zeros(len(found))
 
     def points(self, places: Floats) -> Floats:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         s, t = places.T
         if self.kind == "plane":
             own = np.stack([s, t, np.zeros_like(s)], axis=-1)
@@ -124,7 +124,7 @@ class Quadric:
         return np.asarray(self.origin + own @ self.axes)
 
     def area_vectors(self, places: Floats) -> Floats:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         s, t = places.T
         cosine, sine, one = np.cos(s), np.sin(s), np.ones_like(s)
         if self.kind == "plane":
@@ -177,7 +177,7 @@ class FreeForm:
     breaks: tuple[Floats, Floats] = (np.zeros(0), np.zeros(0))
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         places = np.array(self.nearest_samples(points) if near is None else near, dtype=float)
         reach = self.high - self.low
         low, high = self.low - _BEYOND * reach, self.high + _BEYOND * reach
@@ -203,17 +203,17 @@ class FreeForm:
         return np.asarray(self._samples[0][self._tree.query(points)[1]])
 
     def roughly(self, points: Floats) -> tuple[Floats, Floats]:
-        """As of :class:`Surface`: from the tangent plane at the nearest sample."""
+        """As of :class:`PartSurface`: from the tangent plane at the nearest sample."""
         distance, nearest = self._tree.query(points)
         _, at, normals, bend = self._samples
         return dot(points - at[nearest], normals[nearest]), np.asarray(bend * distance**2 + 1e-12)
 
     def points(self, places: Floats) -> Floats:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         return self.derivatives(*places.T)[0]
 
     def area_vectors(self, places: Floats) -> Floats:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         _, ds, dt, *_ = self.derivatives(*places.T)
         return np.cross(ds, dt)
 
@@ -274,7 +274,7 @@ class Swept:
         return bool(np.abs(points @ y).max() < _IN_PLANE * size and np.min(points @ x) > -_IN_PLANE * size)
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
-        """As of :class:`Surface`: of the curve's own plane only one parameter is looked for."""
+        """As of :class:`PartSurface`: of the curve's own plane only one parameter is looked for."""
         along = int(self.turned)
         if near is None:
             near = self.free.nearest_samples(points)
@@ -307,15 +307,15 @@ class Swept:
         return distance, normals, np.stack([place, height], axis=-1)
 
     def roughly(self, points: Floats) -> tuple[Floats, Floats]:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         return self.free.roughly(points)
 
     def points(self, places: Floats) -> Floats:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         return self.free.points(places)
 
     def area_vectors(self, places: Floats) -> Floats:
-        """As of :class:`Surface`."""
+        """As of :class:`PartSurface`."""
         return self.free.area_vectors(places)
 
     def _flattened(self, points: Floats) -> tuple[Floats, tuple[Floats, Floats], Floats]:

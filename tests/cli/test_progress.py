@@ -102,14 +102,14 @@ def test_build_tells_of_patches_in_the_solid_and_of_triangles_in_stl(told: Told,
         assert fractions(told, stage)[-1] == (1, 1)
 
 
-def test_fill_tells_of_faces_split_and_of_every_file(told: Told, tmp_path: Path) -> None:
+def test_fill_tells_how_far_the_cutting_is_and_of_every_file(told: Told, tmp_path: Path) -> None:
     part, filled = tmp_path / "part.step", tmp_path / "a.brep"
     cadquery.exporters.export(cadquery.Workplane().circle(4).extrude(7), str(part))
     size = ["--cell-size", "10", "--density", "0.3", "--control-points", "5"]
     assert main(["fill", str(part), "-o", str(filled), *size, "--quiet"]) == 0
-    done, total = max(fractions(told, "split"), key=lambda step: step[::-1])
+    done, total = max(fractions(told, "cut"), key=lambda step: step[::-1])
     assert done == total > 1
-    assert fractions(told, "split")[-1] == (1, 1)
+    assert fractions(told, "cut")[-1] == (1, 1)
     assert fractions(told, "write a.brep") == [(0, 1), (1, 1)]
 
 

@@ -41,8 +41,8 @@ def vase() -> cq.Workplane:
     return (
         cq.Workplane("XZ")
         .moveTo(2, 0)
-        .spline([(4, 2), (3, 5), (4, 7)], includeCurrent=True)
-        .lineTo(2, 7)
+        .spline([(4, 2), (3, 4), (3.5, 5)], includeCurrent=True)
+        .lineTo(2, 5)
         .close()
         .revolve()
     )
@@ -76,10 +76,10 @@ def crossed(part: Any, **given: Any) -> FillReport:
     with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         patch.setattr(gyroid_cad.filling.part, "taken", taken)
-        return fill(part, fit=COARSE, keep_islands=True, **{"cell_size": 6, "density": 0.3, **given}).report
+        return fill(part, fit=COARSE, keep_islands=True, **{"cell_size": 8, "density": 0.3, **given}).report
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", ["plate", "cone", "loft", "vase", "filleted"])
 def test_wall_and_channels_are_the_whole_part(name: str) -> None:
     part = DRAWN[name]()
     wall, channels = (crossed(part, kind=kind, surface="primitive") for kind in ("sheet", "channels"))
@@ -114,7 +114,7 @@ def test_the_kernels_fuse_comes_to_the_same(kind: str, monkeypatch: pytest.Monke
         return every(road, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(gyroid_cad.filling.part, "taken", taken)
-    theirs = fill(plate(), 6, fit=COARSE, kind=kind, keep_islands=True, **sizes).report
+    theirs = fill(plate(), 8, fit=COARSE, kind=kind, keep_islands=True, **sizes).report
     assert ours.by_sections
     assert not theirs.by_sections
     assert ours.volume == pytest.approx(theirs.volume, rel=1e-5)
@@ -159,7 +159,7 @@ def combined(draw: st.DrawFn) -> cq.Workplane:
 
 
 # Each takes about a second: many are tried by the benchmark of random parts.
-@settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=4, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(part=combined())
 def test_random_parts_are_filled_wholly_or_refused_for_a_reason(part: cq.Workplane) -> None:
     shape = part.val().wrapped if part.vals() else None
@@ -174,7 +174,7 @@ def test_random_parts_are_filled_wholly_or_refused_for_a_reason(part: cq.Workpla
 
 
 def test_numbers_of_nodes_do_not_depend_on_where_the_part_stands() -> None:
-    near, far = (crossed(plate().translate((x, 0, 0))) for x in (0, 6 * 1000))
+    near, far = (crossed(plate().translate((x, 0, 0))) for x in (0, 8 * 1000))
     assert (near.faces, near.solids) == (far.faces, far.solids)
     assert near.volume == pytest.approx(far.volume, rel=1e-8)
     assert np.isfinite(far.area)

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.Geom2d import Geom2d_BSplineCurve
-from OCP.gp import gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.kernel.boundary import ReadBoundary
 from gyroid_cad.kernel.check import measure_about, parts_of
-from gyroid_cad.kernel.compat import NumberedShapes, Point2dArray, as_edge, as_face
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.split import Change, Pieces
-from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, plane_curve
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
@@ -69,17 +69,15 @@ class _Realisation:
         self.wall: Wall = cut.faces.wall
         self.builder, self.geometry = BRep_Builder(), WallGeometry(self.wall)
         self.complex = self.wall.complex
-        self.identity = TopLoc_Location()
         self.vertices: dict[int, TopoDS_Vertex] = dict(enumerate(read.vertices))
         self.fan_vertices: dict[int, TopoDS_Vertex] = {}
         self.fan_of = {vertex: fan for fan, vertex in cut.fans.items()}
         self.edges: dict[int, TopoDS_Edge] = {}
         self.rims: dict[int, TopoDS_Edge] = {}
         self.pieces_of: dict[int, list[tuple[float, int]]] = {}
-        self.patch_edges, self.patch_fans = self.complex.patch_edges.tolist(), self.complex.patch_fans.tolist()
+        self.patch_edges = self.complex.patch_edges.tolist()
         self.forward = self.complex.edge_forward.tolist()
         self.face_patch, self.face_side = cut.faces.patch.tolist(), cut.faces.side.tolist()
-        self.number_of = {edge: number for number, edge in enumerate(cut.edges)}
 
     # Vertices -------------------------------------------------------------------------------------------------------
 
@@ -114,9 +112,9 @@ class _Realisation:
 
     def edge(self, number: int) -> TopoDS_Edge:
         if number not in self.edges:
+            made = {"rim": self._rim_piece, "part": self._part_piece, "section": self._section_edge}
             edge = self.cut.edges[number]
-            make = {"rim": self._rim_piece, "part": self._part_piece, "section": self._section_edge}[edge.kind]
-            self.edges[number] = make(edge)
+            self.edges[number] = made[edge.kind](number, edge)
         return self.edges[number]
 
     def rim(self, rim: int) -> TopoDS_Edge:
@@ -128,7 +126,7 @@ class _Realisation:
             self.rims[rim] = self._on_rim(rim, self.fan_vertex(start), self.fan_vertex(end), -1.0, 1.0)
         return self.rims[rim]
 
-    def _rim_piece(self, edge: CutEdge) -> TopoDS_Edge:
+    def _rim_piece(self, _: int, edge: CutEdge) -> TopoDS_Edge:
         if edge.first == -1.0 and edge.last == 1.0:
             return self.rim(edge.number)
         return self._on_rim(edge.number, self.vertex(edge.start), self.vertex(edge.end), edge.first, edge.last)
@@ -141,17 +139,17 @@ class _Realisation:
         self.builder.MakeEdge(edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE)
         return self._bounded(edge, start, end, first, last)
 
-    def _part_piece(self, edge: CutEdge) -> TopoDS_Edge:
+    def _part_piece(self, number: int, edge: CutEdge) -> TopoDS_Edge:
         own, whole = self.read.edges[edge.number], self.read.boundary.edges[edge.number]
         if edge.first == whole.first and edge.last == whole.last:
             return own
         # The curves stay the part's own, in space and on both faces.
         piece = as_edge(own.EmptyCopied())
         self.builder.UpdateEdge(piece, _MARGIN * self.read.boundary.deviation(edge.number))
-        self.pieces_of.setdefault(edge.number, []).append((edge.first, self.number_of[edge]))
+        self.pieces_of.setdefault(edge.number, []).append((edge.first, number))
         return self._bounded(piece, self.vertex(edge.start), self.vertex(edge.end), edge.first, edge.last)
 
-    def _section_edge(self, edge: CutEdge) -> TopoDS_Edge:
+    def _section_edge(self, _: int, edge: CutEdge) -> TopoDS_Edge:
         section = self.cut.sections[edge.number]
         points = section.in_space
         curve = kernel_curve(NurbsCurve(points, np.ones(len(points)), section_knots(len(points))))
@@ -191,7 +189,7 @@ class _Realisation:
                     line, tolerance = self.geometry.border(patch, k), TOLERANCE
                 else:
                     line, tolerance = (
-                        self._plane_curve(self.cut.sections[edge.number].in_square),
+                        _plane_section(self.cut.sections[edge.number].in_square),
                         self._tolerance(edge.number),
                     )
                 self.builder.UpdateEdge(self.edge(number), line, surface, location, tolerance)
@@ -225,16 +223,10 @@ class _Realisation:
             for number, _ in loop:
                 edge = self.cut.edges[number]
                 if edge.kind == "section":
-                    curve = self._plane_curve(self.cut.sections[edge.number].on_part)
+                    curve = _plane_section(self.cut.sections[edge.number].on_part)
                     self.builder.UpdateEdge(self.edge(number), curve, surface, location, self._tolerance(edge.number))
             self.builder.Add(made, self._wire(loop))
         return as_face(made.Oriented(own.Orientation()))
-
-    def _plane_curve(self, control: Floats) -> Geom2d_BSplineCurve:
-        poles = Point2dArray(1, len(control))
-        for index, place in enumerate(control.tolist(), 1):
-            poles.SetValue(index, gp_Pnt2d(*place))
-        return Geom2d_BSplineCurve(poles, *kernel_knots(section_knots(len(control))), 3)
 
     def _wire(self, loop: Uses) -> TopoDS_Wire:
         wire = TopoDS_Wire()
@@ -251,6 +243,11 @@ class _Realisation:
             (self.read.edges[edge], tuple(self.edges[number] for _, number in sorted(pieces)))
             for edge, pieces in self.pieces_of.items()
         )
+
+
+def _plane_section(control: Floats) -> Geom2d_BSplineCurve:
+    """A section curve in the parameters of a face."""
+    return plane_curve(control, section_knots(len(control)))
 
 
 def sizes_of(

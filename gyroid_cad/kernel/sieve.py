@@ -7,7 +7,6 @@ from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.BOPAlgo import BOPAlgo_Builder
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepTools import BRepTools_ReShape
@@ -20,7 +19,7 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.depth import NearDistances, points_on
 from gyroid_cad.kernel.offset_pieces import offset_pieces
 from gyroid_cad.kernel.offset_surface import curve_points
-from gyroid_cad.kernel.split import Change, changes, modified, solids_of
+from gyroid_cad.kernel.split import Change, changes, general_fuse, modified, solids_of
 
 __all__ = ["core_of_pieces", "with_changes"]
 
@@ -73,24 +72,14 @@ def _assembled(
     """The solids that pieces bound, once those that cross are cut against each other."""
     faces = list(whole)
     if crossing:
-        fuse = _cut(crossing, fuzzy * skin)
+        fuse = general_fuse(
+            *crossing, fuzzy=fuzzy * skin, task="cut the offsets of the part's faces against each other"
+        )
         images = [as_face(image) for piece in crossing for image in modified(fuse, piece)]
         kept = [image for image in images if _is_deep(image, skin, depths)]
         faces = [*with_changes(whole, changes(fuse, compound_of(crossing))), *kept]
     _require_closed(faces)
     return solids_of(faces)
-
-
-def _cut(pieces: Iterable[TopoDS_Face], fuzzy: float) -> BOPAlgo_Builder:
-    fuse = BOPAlgo_Builder()
-    fuse.SetNonDestructive(True)
-    fuse.SetFuzzyValue(fuzzy)
-    for piece in pieces:
-        fuse.AddArgument(piece)
-    fuse.Perform()
-    if fuse.HasErrors():
-        raise KernelError("the kernel could not cut the offsets of the part's faces against each other")
-    return fuse
 
 
 def _is_deep(face: TopoDS_Face, skin: float, depths: NearDistances) -> bool:

@@ -310,15 +310,31 @@ def _extent(shape: TopoDS_Shape) -> float:
     return float(box_round([shape]).SquareExtent())
 
 
-def general_fuse(*arguments: TopoDS_Shape) -> BOPAlgo_Builder:
-    """The kernel's general fuse; within an argument it looks for no crossings."""
+def general_fuse(
+    *arguments: TopoDS_Shape, fuzzy: float = 0.0, task: str = "split the part against the faces of the lattice"
+) -> BOPAlgo_Builder:
+    """The kernel's general fuse; within an argument it looks for no crossings.
+
+    Parameters
+    ----------
+    *arguments : TopoDS_Shape
+    fuzzy : float
+        In mm, within which places are one.
+    task : str
+        That the kernel is said to have failed in.
+
+    Raises
+    ------
+    KernelError
+    """
     fuse = BOPAlgo_Builder()
     fuse.SetNonDestructive(True)
+    fuse.SetFuzzyValue(fuzzy)
     for argument in arguments:
         fuse.AddArgument(argument)
     fuse.Perform()
     if fuse.HasErrors():
-        raise KernelError("the kernel could not split the part against the faces of the lattice")
+        raise KernelError(f"the kernel could not {task}")
     return fuse
 
 

@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
-from OCP.Geom2d import Geom2d_Line
+from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Line
 from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
-from gyroid_cad.kernel.compat import IntegerArray, PointArray, PointGrid, RealArray, RealGrid
+from gyroid_cad.kernel.compat import IntegerArray, Point2dArray, PointArray, PointGrid, RealArray, RealGrid
 from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
 from gyroid_cad.wall.offset import Wall
 
@@ -38,6 +38,14 @@ def kernel_curve(curve: NurbsCurve) -> Geom_BSplineCurve:
     if np.ptp(curve.weights) == 0:
         return Geom_BSplineCurve(poles, knots, multiplicities, curve.degree)
     return Geom_BSplineCurve(poles, _reals(curve.weights), knots, multiplicities, curve.degree)
+
+
+def plane_curve(points: Floats, knots: Floats) -> Geom2d_BSplineCurve:
+    """A cubic in the parameter plane, by its control points (n, 2), as a ``Geom2d_BSplineCurve``."""
+    poles = Point2dArray(1, len(points))
+    for index, place in enumerate(points.tolist(), 1):
+        poles.SetValue(index, gp_Pnt2d(*place))
+    return Geom2d_BSplineCurve(poles, *kernel_knots(knots), 3)
 
 
 def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:

@@ -8,15 +8,14 @@ import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.Geom import Geom_BSplineCurve, Geom_Plane
 from OCP.Geom2d import Geom2d_BSplineCurve
-from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
 from OCP.TopAbs import TopAbs_REVERSED, TopAbs_SHELL
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import parts_of
-from gyroid_cad.kernel.compat import Point2dArray
-from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, kernel_knots
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, plane_curve
 from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.trim.box import BoxEdge, BoxFace, TrimmedWall
 from gyroid_cad.trim.caps import Cap, plane_axes
@@ -130,12 +129,9 @@ class _Realisation:
             parameters = sections.parameters[curve]
             points = sections.points[curve] @ self.cut.box.axes.T
             knots = section_knots(len(points))
-            poles = Point2dArray(1, len(parameters))
-            for index, place in enumerate(parameters.tolist(), 1):
-                poles.SetValue(index, gp_Pnt2d(*place))
             self.curves[key] = (
                 kernel_curve(NurbsCurve(points, np.ones(len(points)), knots)),
-                Geom2d_BSplineCurve(poles, *kernel_knots(knots), 3),
+                plane_curve(parameters, knots),
                 max(TOLERANCE, _MARGIN * float(sections.deviation[curve])),
             )
         return self.curves[key]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.boundary import Boundary, BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
-from gyroid_cad.trim.ends import by_number, ends_of, halved
-from gyroid_cad.trim.lattice_faces import LatticeFaces, pairs_of
+from gyroid_cad.trim.ends import ends_of, halved
+from gyroid_cad.trim.lattice_faces import LatticeFaces, by_number, pairs_of
 from gyroid_cad.trim.loops import decided, linked, nested
 from gyroid_cad.trim.nodes import part_nodes, rim_nodes
 from gyroid_cad.trim.paths import closed_paths, open_paths

@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.edge_crossings import square_points
-from gyroid_cad.trim.lattice_faces import Pairs
+from gyroid_cad.trim.lattice_faces import Pairs, by_number
 from gyroid_cad.trim.nodes import PartNodes, RimNodes
 from gyroid_cad.trim.paths import Ends, Paths
+from gyroid_cad.trim.sections import level_step
 
-__all__ = ["by_number", "ends_of", "halved"]
+__all__ = ["ends_of", "halved"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -98,8 +99,7 @@ def _settled(pairs: Pairs, ends: Ends, side: Integers) -> Ends:
         if step == 0:
             onward = np.stack([slope[:, 1], -slope[:, 0]], axis=-1)
             entering = np.where(on_rim, np.sum(onward * _INWARDS[side], axis=1) > 0, entering)
-        steepness = np.maximum(np.sum(slope**2, axis=1), np.finfo(float).tiny)
-        places = np.where(on_rim[:, None], places, places - slope * (height[:, 0] / steepness)[:, None])
+        places = np.where(on_rim[:, None], places, places + level_step(height[:, 0], slope))
     return Ends(ends.pair, ends.node, places, near, entering)
 
 
@@ -119,11 +119,3 @@ def halved(closed: Paths, pairs: Pairs, first: int) -> tuple[Paths, list[Floats]
         near += [part[: middle + 1], part[middle:]]
     pairs_of, starts, ends = np.array(numbers, dtype=np.int64).reshape(-1, 3).T
     return Paths(pairs_of, starts, ends, places, near), points
-
-
-def by_number(numbers: Integers) -> dict[int, list[int]]:
-    """Positions of each number, in order."""
-    found: dict[int, list[int]] = {}
-    for position, number in enumerate(numbers.ravel().tolist()):
-        found.setdefault(number, []).append(position)
-    return found

@@ -14,7 +14,7 @@ from gyroid_cad.nurbs.surface import edge_row, grid_points, point_derivatives
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["GRID", "LatticeFaces", "Pairs", "grouped", "pairs_of"]
+__all__ = ["GRID", "LatticeFaces", "Pairs", "by_number", "grouped", "pairs_of"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -153,3 +153,11 @@ def grouped(numbers: Integers) -> list[tuple[int, Integers]]:
     order = np.argsort(numbers, kind="stable")
     distinct, first = np.unique(numbers[order], return_index=True)
     return list(zip(distinct.tolist(), np.split(order, first[1:]), strict=True))
+
+
+def by_number(numbers: Integers) -> dict[int, list[int]]:
+    """Positions of each number, in order."""
+    found: dict[int, list[int]] = {}
+    for position, number in enumerate(numbers.ravel().tolist()):
+        found.setdefault(number, []).append(position)
+    return found

@@ -108,7 +108,7 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     flat, first = np.unique(rims.ravel(), return_index=True)
     owner, owned_side = np.divmod(first, 4)
     index = np.searchsorted(flat, rims)
-    both = np.stack([np.repeat(index[pairs.face], 1, axis=0).ravel(), np.repeat(pairs.part, 4)], axis=1)
+    both = np.stack([index[pairs.face].ravel(), np.repeat(pairs.part, 4)], axis=1)
     rim, part = np.unique(both, axis=0).T
     near = _may_cross(pairs, owner[rim], owned_side[rim], part)
     rim, part = rim[near], part[near]

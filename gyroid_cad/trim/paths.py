@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.lattice_faces import GRID, Pairs, grouped
+from gyroid_cad.trim.lattice_faces import GRID, Pairs, by_number, grouped
+from gyroid_cad.trim.sections import level_step
 
 __all__ = ["Ends", "Paths", "closed_paths", "open_paths"]
 
@@ -173,7 +174,7 @@ def _onward(pairs: Pairs, pair: Integers, place: Floats, near: Floats) -> tuple[
     slope, height = slopes[:, 0], height[:, 0]
     steepness = np.maximum(np.sum(slope * slope, axis=1), np.finfo(float).tiny)
     turned = np.stack([slope[:, 1], -slope[:, 0]], axis=-1) / np.sqrt(steepness)[:, None]
-    return turned, -slope * (height / steepness)[:, None], where[:, 0]
+    return turned, level_step(height, slope), where[:, 0]
 
 
 def _step(
@@ -237,9 +238,7 @@ def _unexplained(pairs: Pairs, known: Paths) -> tuple[Integers, Floats]:
     """Pairs and places on curves within both faces that none of the known ones passes."""
     step = 2 / (GRID - 1)
     cells: list[Integers] = []
-    by_pair: dict[int, list[int]] = {}
-    for path, number in enumerate(known.pair.tolist()):
-        by_pair.setdefault(number, []).append(path)
+    by_pair = by_number(known.pair)
     chunk = 128
     faces, first = np.unique(pairs.face, return_index=True)
     bounds = np.append(first, len(pairs.face))
@@ -273,8 +272,7 @@ def _above(pairs: Pairs, rows: Integers, points: Floats, which: Integers) -> Boo
         close = np.abs(heights) - error <= reach[which[some], None, None]
         # The cells round each such place, on the finer grid.
         cells = close[:, :-1, :-1] | close[:, 1:, :-1] | close[:, :-1, 1:] | close[:, 1:, 1:]
-        spread = np.kron(heights > 0, np.ones((_COARSE, _COARSE), dtype=bool))[:, :GRID, :GRID]
-        above[some] = spread[:, :GRID, :GRID]
+        above[some] = np.kron(heights > 0, np.ones((_COARSE, _COARSE), dtype=bool))[:, :GRID, :GRID]
         row, i, j = np.nonzero(cells)
         offsets = np.arange(_COARSE + 1)
         at_i = (_COARSE * i)[:, None, None] + offsets[:, None] + 0 * offsets
@@ -318,9 +316,7 @@ def _on_curves(
     back = np.zeros_like(at)
     for _ in range(8):
         height, slopes, where, _ = pairs.heights(pair, at[:, :1], at[:, 1:], near)
-        near, slope = where, slopes[:, 0]
-        steepness = np.maximum(np.sum(slope * slope, axis=1), np.finfo(float).tiny)
-        back = -slope * (height[:, 0] / steepness)[:, None]
+        near, back = where, level_step(height, slopes)[:, 0]
         length = np.linalg.norm(back, axis=1)
         at = at + back * np.minimum(1, step / np.maximum(length, step))[:, None]
     assert near is not None

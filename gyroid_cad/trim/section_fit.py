@@ -11,7 +11,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.trim.lattice_faces import Pairs, grouped
 from gyroid_cad.trim.paths import Paths
-from gyroid_cad.trim.sections import on_section, section_knots
+from gyroid_cad.trim.sections import chord_lengths, level_step, on_section, section_knots, spread_along
 
 __all__ = ["SectionCurve", "fitted_sections"]
 
@@ -138,7 +138,7 @@ def _parted(pairs: Pairs, paths: Paths, which: Integers, first: int) -> tuple[Pa
     for path in which.tolist():
         pair, start, end = int(paths.pair[path]), int(paths.start[path]), int(paths.end[path])
         way = np.hstack([paths.places[path], paths.near[path]])
-        even = _spread(way, _run(way[:, :2]), np.linspace(0, 1, 2 * _HALF + 1))[np.newaxis]
+        even = spread_along(way, chord_lengths(way[:, :2]), np.linspace(0, 1, 2 * _HALF + 1))[np.newaxis]
         found, even = _onto_curve(pairs, np.array([pair]), even, even[:, [0, -1]])
         node = first + len(points)
         points.append(found[0, _HALF])
@@ -156,11 +156,13 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     pair = paths.pair[which]
     ways = [np.hstack([paths.places[k], paths.near[k]]) for k in which.tolist()]
     ends = np.array([[way[0], way[-1]] for way in ways])
-    stations = np.array([_spread(way, _run(way[:, :2]), even) for way in ways])
+    stations = np.array([spread_along(way, chord_lengths(way[:, :2]), even) for way in ways])
     points, stations = _onto_curve(pairs, pair, stations, ends)
-    stations = np.array([_spread(way, _run(some), even) for way, some in zip(stations, points, strict=True)])
+    stations = np.array(
+        [spread_along(way, chord_lengths(some), even) for way, some in zip(stations, points, strict=True)]
+    )
     points, stations = _onto_curve(pairs, pair, stations, ends)
-    t = np.array([_run(some) for some in points])
+    t = np.array([chord_lengths(some) for some in points])
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(which), count + 1, count + 1)
     # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney):
     # nearly even ones do.
@@ -189,8 +191,7 @@ def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) ->
     points = np.zeros((*stations.shape[:2], 3))
     for _ in range(_NEWTON_STEPS):
         heights, slopes, near, points = pairs.heights(pair, stations[..., 0], stations[..., 1], near)
-        steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
-        step = -slopes * (heights / steepness)[..., None]
+        step = level_step(heights, slopes)
         step[:, [0, -1]] = 0
         length = np.linalg.norm(step, axis=-1, keepdims=True)
         if length.max(initial=0.0) < _CONVERGED:
@@ -217,15 +218,3 @@ def _solved(through: Floats, values: Floats) -> Floats:
         values[:, k] -= np.einsum("mj,mjc->mc", through[:, k, above], values[:, above])
         values[:, k] /= through[:, k, k, None]
     return values
-
-
-def _run(points: Floats) -> Floats:
-    """Length of the chords up to each point, in parts of all."""
-    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    with np.errstate(invalid="ignore"):
-        return np.asarray(run / run[-1])
-
-
-def _spread(way: Floats, run: Floats, t: Floats) -> Floats:
-    """Places of a way at parameters t, where its own points have parameters ``run``."""
-    return np.stack([np.interp(t, run, column) for column in way.T], axis=-1)

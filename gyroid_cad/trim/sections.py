@@ -19,7 +19,7 @@ from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, FacesToCut, plane_heights
 
-__all__ = ["Sections", "on_section", "plane_sections", "section_knots"]
+__all__ = ["Sections", "chord_lengths", "level_step", "on_section", "plane_sections", "section_knots", "spread_along"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -171,10 +171,15 @@ def _along(faces: FacesToCut, face: Integers, plane: Integers, place: Floats) ->
     return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
 
+def level_step(height: Floats, slopes: Floats) -> Floats:
+    """One step of Newton's method from heights (...) with slopes (..., 2) straight across to their level curves."""
+    steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
+    return np.asarray(-slopes * (height / steepness)[..., np.newaxis])
+
+
 def _towards(height: Floats, slopes: Floats) -> Floats:
     """A Newton step back to the level curve, straight across it; short where the face all but touches the plane."""
-    steepness = np.maximum(np.sum(slopes * slopes, axis=-1), np.finfo(float).tiny)
-    step = -slopes * (height / steepness)[..., np.newaxis]
+    step = level_step(height, slopes)
     length = np.linalg.norm(step, axis=-1, keepdims=True)
     return np.asarray(step * np.minimum(1.0, _LONGEST_STEP / np.maximum(length, _LONGEST_STEP)))
 
@@ -228,14 +233,16 @@ def _fitted(
 ) -> tuple[Floats, Floats, Floats]:
     """Control points in the square and in space, and how far the two curves are from each other."""
     even = np.linspace(0, 1, count + 1)
-    stations = np.array([_spread(way, _run(way), even) for way in ways])
+    stations = np.array([spread_along(way, chord_lengths(way), even) for way in ways])
     points = _onto_level(faces, face, plane, stations)
     # Evenly spread in the square, then in space.
-    stations = np.array([_spread(way, _run(some), even) for way, some in zip(stations, points, strict=True)])
+    stations = np.array(
+        [spread_along(way, chord_lengths(some), even) for way, some in zip(stations, points, strict=True)]
+    )
     stations[:, [0, -1]] = [[way[0], way[-1]] for way in ways]
     points = _onto_level(faces, face, plane, stations)
     # Parameters by chord length: nearly even, and smooth however the stations are not quite so.
-    t = np.array([_run(some) for some in points])
+    t = np.array([chord_lengths(some) for some in points])
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
     # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
     crowded = ~np.all(np.isfinite(t), axis=1)
@@ -262,12 +269,13 @@ def _onto_level(faces: FacesToCut, face: Integers, plane: Integers, stations: Fl
     return points
 
 
-def _run(points: Floats) -> Floats:
-    """Length of the chords up to each point, in parts of all."""
+def chord_lengths(points: Floats) -> Floats:
+    """Length of the chords up to each point, in parts of all; not numbers if there is none."""
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return np.asarray(run / run[-1])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(run / run[-1])
 
 
-def _spread(way: Floats, run: Floats, t: Floats) -> Floats:
-    """Places of a way in the square at parameters t, where its own points have parameters ``run``."""
-    return np.stack([np.interp(t, run, way[:, axis]) for axis in (0, 1)], axis=-1)
+def spread_along(way: Floats, run: Floats, t: Floats) -> Floats:
+    """Places of a way (k, d) at parameters t, where its own points have parameters ``run``; shape (q, d)."""
+    return np.stack([np.interp(t, run, column) for column in way.T], axis=-1)

@@ -284,9 +284,7 @@ class TriangleJob:
         report = joint_report(reports, whole.remarks)
         warn_of_voids(report.voids)
         warn_of_uncovered(report.uncovered)
-        counts = np.cumsum([0, *(len(vertices) for vertices, _ in places)])
-        triangles = np.concatenate([numbers + first for (_, numbers), first in zip(places, counts[:-1], strict=True)])
-        return FilledTriangles(np.concatenate([vertices for vertices, _ in places]), triangles, report)
+        return FilledTriangles(*_together(places), report)
 
     @property
     def _fineness(self) -> float:
@@ -383,11 +381,16 @@ def _without_islands(
 
 def _arrays(pieces: Sequence[Body], middle: Floats, deviation: float) -> tuple[Floats, Integers]:
     """Vertices and triangles of all pieces where they stand; as single precision has them, if that is fine enough."""
-    found = [piece.triangles() for piece in pieces]
-    counts = np.cumsum([0, *(len(vertices) for vertices, _ in found)])
-    vertices = np.concatenate([vertices for vertices, _ in found]) + middle
-    triangles = np.concatenate([numbers + first for (_, numbers), first in zip(found, counts[:-1], strict=True)])
+    vertices, triangles = _together([piece.triangles() for piece in pieces])
+    vertices = vertices + middle
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if is_coarse(float(np.abs(vertices).max()), size, deviation):
         return vertices, triangles
     return storable_triangles(vertices, triangles)
+
+
+def _together(bodies: Sequence[tuple[Floats, Integers]]) -> tuple[Floats, Integers]:
+    """Vertices and triangles of several bodies as those of one."""
+    counts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    triangles = [numbers + first for (_, numbers), first in zip(bodies, counts[:-1], strict=True)]
+    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(triangles)

@@ -91,7 +91,7 @@ class Quadric:
         own = (points - self.origin) @ self.axes.T
         x, y, z = own.T
         if self.kind == "plane":
-            return z, np.broadcast_to(self.axes[2], own.shape), own[:, :2]
+            return self._handed * z, np.broadcast_to(self._handed * self.axes[2], own.shape), own[:, :2]
         # Past the axis a meridian is that of the opposite angle, at a negative distance.
         side = -1.0 if self.crossed else 1.0
         along = side * np.hypot(x, y)

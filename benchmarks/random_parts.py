@@ -47,6 +47,7 @@ from OCP.TopAbs import TopAbs_EDGE
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Wire
 
 from benchmarks.timing import Row, arguments_for, plain_table, print_verdicts
+from gyroid_cad.common.choices import Kind, SurfaceName
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.filling.report import FillReport
@@ -57,6 +58,7 @@ from gyroid_cad.surface.fit import FitSettings
 __all__ = ["main"]
 
 _SURFACES: tuple[SurfaceName, ...] = ("gyroid", "diamond", "primitive")
+_KINDS: tuple[Kind, ...] = ("sheet", "channels")
 # How far wall and channels together may be from the part, and the share of parts that may fail.
 _OFF, _FAILED = 1e-5, 0.02
 _COARSE = FitSettings(5)
@@ -113,13 +115,15 @@ def _outcome(seed: int) -> str:
 
     def failed(stage: str, _: int, __: int) -> None:
         if "failed" in stage:
-            failures.append(stage.split("follows: ")[-1])
+            failures.append(stage.rsplit("follows: ", maxsplit=1)[-1])
 
     reports: list[FillReport] = []
     failures: list[str] = []
-    for kind in ("sheet", "channels"):
+    for kind in _KINDS:
         try:
-            made = fill(part, cell, density=0.3, kind=kind, surface=surface, fit=_COARSE, keep_islands=True, progress=failed)
+            made = fill(
+                part, cell, density=0.3, kind=kind, surface=surface, fit=_COARSE, keep_islands=True, progress=failed
+            )
         except GyroidError as refused:
             return f"refused: {kind}, {refused}"
         reports.append(made.report)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import GyroidError
+from gyroid_cad.mesh.triangles.windings import winding_numbers
 
 __all__ = ["SignedDistances", "locator_of", "vtk_module"]
 
@@ -18,12 +19,11 @@ Integers = NDArray[np.int64]
 
 
 class SignedDistances:
-    """Distances of points from closed triangles, below zero inside (``vtkImplicitPolyDataDistance``).
+    """Distances of points from closed triangles, below zero inside.
 
-    The side is told by the nearest triangle's normal, at edges and corners by the mean of those that meet there,
-    weighted by their angles: J. A. Baerentzen and H. Aanaes, Signed distance computation using the angle weighted
-    pseudonormal, IEEE TVCG 11 (2005). Of what the package depends on VTK alone tells distance and side at once, for
-    many points in one call.
+    How far is told by ``vtkImplicitPolyDataDistance``, which alone of what the package depends on answers for many
+    points in one call; on which side by how often the triangles go round a point: the normals that VTK tells it by
+    mislead at acute edges, where points far outside came out inside.
 
     Parameters
     ----------
@@ -57,7 +57,8 @@ class SignedDistances:
         if not len(points):
             return np.empty(0)
         self._function.FunctionValue(support.numpy_to_vtk(np.array(points, dtype=float, order="C")), found)
-        return np.array(support.vtk_to_numpy(found))
+        away = np.abs(support.vtk_to_numpy(found))
+        return np.asarray(np.where(winding_numbers(*self._surface, points) > 0, -away, away))
 
     def nearest(self, points: Floats) -> Floats:
         """Places on the triangles that are nearest to points, shape (n, 3), in mm; shape (n, 3).

@@ -72,11 +72,13 @@ def main(arguments: Sequence[str] = ()) -> bool:
     parser.add_argument("--timeout", type=float, default=120, help="seconds for each part")
     given = parser.parse_args(arguments)
     seeds = range(given.first, given.first + (2 if given.small else given.parts))
-    found = {seed: _in_process(seed, given.timeout) for seed in seeds}
-    lines = [(str(seed), outcome, f"{seconds:.1f}") for seed, (outcome, seconds) in found.items() if outcome != "whole"]
-    for line in lines:
-        print("  ".join(line))
-    kinds = Counter(outcome.split(":")[0] for outcome, _ in found.values())
+    found: dict[int, str] = {}
+    for seed in seeds:
+        outcome, seconds = _in_process(seed, given.timeout)
+        found[seed] = outcome
+        if outcome != "whole":
+            print(f"seed {seed}, {seconds:.1f} s: {outcome}", flush=True)
+    kinds = Counter(outcome.split(":")[0] for outcome in found.values())
     plain_table("Random parts", ("outcome", "parts"), [(kind, str(count)) for kind, count in kinds.most_common()])
     good = sum(count for kind, count in kinds.items() if kind in ("whole", "shifted", "by booleans", "no part"))
     return print_verdicts("Failed", [Row("share of parts", 1 - good / len(found), _FAILED, 0.0)])
@@ -115,10 +117,10 @@ def _outcome(seed: int) -> str:
 
     def failed(stage: str, _: int, __: int) -> None:
         if "failed" in stage:
-            failures.append(stage.rsplit("follows: ", maxsplit=1)[-1])
+            failures.add(stage.rsplit("follows: ", maxsplit=1)[-1])
 
     reports: list[FillReport] = []
-    failures: list[str] = []
+    failures: set[str] = set()
     for kind in _KINDS:
         try:
             made = fill(

@@ -1,4 +1,4 @@
-"""How often closed triangles go round points, counted along upright lines."""
+"""Turns that closed triangles make round points, counted along upright lines."""
 
 from __future__ import annotations
 

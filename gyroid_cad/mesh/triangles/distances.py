@@ -1,7 +1,8 @@
-"""Distances of points from triangles, and nearest places on them (VTK)."""
+"""Distances of points from triangles and nearest places on them (VTK), and turns that triangles make round points."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from importlib import import_module
 from typing import Any
@@ -9,13 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import numbered_groups
 from gyroid_cad.errors import GyroidError
-from gyroid_cad.mesh.triangles.windings import winding_numbers
 
-__all__ = ["SignedDistances", "locator_of", "vtk_module"]
+__all__ = ["SignedDistances", "locator_of", "vtk_module", "winding_numbers"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+# Lines run along no direction that a part was drawn by.
+_TURN = np.linalg.qr(np.array([[1.0, 0.31, 0.17], [-0.23, 1.0, 0.41], [0.37, -0.29, 1.0]]))[0]
+_PAIRS_AT_ONCE = 2**19
 
 
 class SignedDistances:
@@ -110,3 +115,93 @@ def vtk_module(module: str) -> Any:
         return import_module(f"vtkmodules.{module}")
     except ModuleNotFoundError as problem:
         raise GyroidError(f"distances from triangles need VTK (pip install vtk): {problem}") from None
+
+
+def winding_numbers(vertices: Floats, triangles: Integers, points: Floats) -> Integers:
+    """Numbers of turns that closed triangles make round points.
+
+    One inside, none outside, and others where the triangles run through themselves.
+
+    A line from a point upwards goes out of the surface once more than into it if the point is inside. On which side
+    of an edge it passes is told from the same two numbered corners for both triangles there, so that it passes through
+    exactly one of them: no line slips through, as it may where a side is told by the nearest triangle's normal.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        Counterclockwise seen from outside.
+    points : ndarray, shape (n, 3)
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> winding_numbers(corners, sides, np.array([[0.1, 0.2, 0.3], [0.2, 0.2, -2.0]])).tolist()
+    [1, 0]
+    """
+    turns = np.zeros(len(points), dtype=np.int64)
+    if not len(points) or not len(triangles):
+        return turns
+    corners, own = vertices @ _TURN, points @ _TURN
+    for triangle, point in _below(corners[triangles], own):
+        a, b, c = triangles[triangle].T
+        place = own[point]
+        left = [_left_of(corners, start, end, place) for start, end in ((a, b), (b, c), (c, a))]
+        up, down = np.logical_and.reduce(left), ~np.logical_or.reduce(left)
+        hit = np.flatnonzero(up | down)
+        above = _heights(corners[triangles[triangle[hit]]], place[hit]) > place[hit, 2]
+        np.add.at(turns, point[hit[above]], np.where(up[hit[above]], 1, -1))
+    return turns
+
+
+def _below(corners: Floats, points: Floats) -> Iterator[tuple[Integers, Integers]]:
+    """Triangles with the points that may lie beneath them: those of the same rows of the plane, and as far along."""
+    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+    start, end = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    rows = max(1, int(np.sqrt(len(points))))
+    height = (float(end[1] - start[1]) or 1.0) / rows
+    # Rows are laid one after the other, so that each stretch of one is a stretch of the sorted places.
+    width = 2 * float(end[0] - start[0]) + 1.0
+
+    def row_of(y: Floats) -> Integers:
+        return np.asarray(np.clip((y - start[1]) / height, 0, rows - 1).astype(np.int64))
+
+    keys = row_of(points[:, 1]) * width + points[:, 0] - start[0]
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    met = np.all((low <= end) & (high >= start), axis=1)
+    near = np.flatnonzero(met & (corners[..., 2].max(axis=1) >= points[:, 2].min()))
+    first_row = row_of(low[near, 1])
+    which, step = numbered_groups(row_of(high[near, 1]) - first_row + 1)
+    row, near = (first_row[which] + step) * width, near[which]
+    along = [np.clip(side[near, 0] - start[0], -0.25, width - 0.5) for side in (low, high)]
+    first = np.searchsorted(keys, row + along[0], side="left")
+    count = np.maximum(np.searchsorted(keys, row + along[1], side="right") - first, 0)
+    bounds = np.searchsorted(np.cumsum(count), np.arange(_PAIRS_AT_ONCE, int(count.sum()), _PAIRS_AT_ONCE))
+    for some in np.split(np.arange(len(near)), bounds + 1):
+        which, step = numbered_groups(count[some])
+        yield near[some[which]], order[first[some[which]] + step]
+
+
+def _left_of(corners: Floats, start: Integers, end: Integers, place: Floats) -> NDArray[np.bool_]:
+    """Mask of the places to the left of a side, told alike for both triangles that have it."""
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    along, away = corners[high, :2] - corners[low, :2], place[:, :2] - corners[low, :2]
+    found = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] > 0
+    return np.asarray(found == (start < end))
+
+
+def _heights(corners: Floats, place: Floats) -> Floats:
+    """Heights of triangles' planes, corners (n, 3, 3), over places (n, 3)."""
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    away = place[:, :2] - corners[:, 0, :2]
+    twice = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+    s = (away[:, 0] * across[:, 1] - away[:, 1] * across[:, 0]) / twice
+    t = (along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0]) / twice
+    return np.asarray(corners[:, 0, 2] + s * along[:, 2] + t * across[:, 2])

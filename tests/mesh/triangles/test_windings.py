@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import ConvexHull
 
-from gyroid_cad.mesh.triangles.distances import SignedDistances
-from gyroid_cad.mesh.triangles.windings import winding_numbers
+from gyroid_cad.mesh.triangles.distances import SignedDistances, winding_numbers
 
 clouds = arrays(np.float64, (9, 3), elements=st.integers(-1000, 1000).map(lambda k: k / 1000), unique=True)
 

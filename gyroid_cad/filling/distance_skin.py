@@ -52,11 +52,14 @@ class Shell:
         In mm.
     openings : sequence
     core : shape, Workplane or path-like, optional
+    fillet : float, optional
+        Radius in mm where the lattice meets it.
     """
 
     skin: float | None = None
     openings: Sequence[Any] = ()
     core: Any = None
+    fillet: float | None = None
 
     def core_of(
         self, part: TrianglePart, opened: Booleans | None, deviation: float

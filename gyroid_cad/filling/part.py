@@ -26,7 +26,7 @@ from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
+from gyroid_cad.trim.islands import SealedVoid, speck_below
 from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
 
 __all__ = [
@@ -37,7 +37,6 @@ __all__ = [
     "part_of",
     "shapes_of",
     "solid_names",
-    "without_islands",
     "without_specks",
 ]
 
@@ -200,28 +199,6 @@ class Filling:
         if not (valid and closed):
             state = "valid" if valid else "invalid"
             raise KernelError(f"the kernel's filled part is {state}, with {counted.open_edges} open edges")
-
-
-def without_islands(
-    domains: dict[str, list[Made]], cells: float, rule: IslandRule
-) -> tuple[dict[str, list[Made]], Islands]:
-    """Return the pieces of every domain that a rule keeps, and what is left or dropped besides the largest ones.
-
-    Parameters
-    ----------
-    domains : dict
-        As of :class:`Outcome`.
-    cells : float
-        How many cells what is filled is as large as.
-    rule : IslandRule
-    """
-    chosen, islands = {}, Islands()
-    for name, some in domains.items():
-        sizes = [_size(piece) for piece in some]
-        kept = kept_pieces(sizes, sum(sizes) / cells, rule)
-        chosen[name] = [some[index] for index in kept]
-        islands += islands_of([piece.volume for piece in some], kept)
-    return chosen, islands
 
 
 def without_specks(

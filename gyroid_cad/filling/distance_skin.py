@@ -91,7 +91,7 @@ class _Depth:
         signed = self._signed(points)
         if not self._open:
             return -signed - self._skin
-        return np.minimum(np.abs(self._walls(points)) - self._skin, _BEYOND * self._skin - signed)
+        return np.minimum(self._walls.away(points) - self._skin, _BEYOND * self._skin - signed)
 
     def normals(self, points: Floats) -> Floats:
         """Out of the core: towards the nearest place of the skin's outside, or away from that of an opening."""

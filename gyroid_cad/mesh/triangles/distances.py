@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import numbered_groups
 from gyroid_cad.errors import GyroidError
 
-__all__ = ["SignedDistances", "locator_of", "vtk_module", "winding_numbers"]
+__all__ = ["SignedDistances", "Windings", "locator_of", "vtk_module"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -58,12 +58,21 @@ class SignedDistances:
 
     def __call__(self, points: Floats) -> Floats:
         """Signed distances of points, shape (n, 3), in mm; shape (n,)."""
+        away = self.away(points)
+        return np.asarray(np.where(self._turns(points) > 0, -away, away))
+
+    def away(self, points: Floats) -> Floats:
+        """Distances without a sign, which triangles that are not closed have too.
+
+        >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        >>> SignedDistances(corners, np.array([[0, 1, 2]])).away(np.array([[0.2, 0.3, -2.0]])).tolist()
+        [2.0]
+        """
         support, found = vtk_module("util.numpy_support"), vtk_module("vtkCommonCore").vtkDoubleArray()
         if not len(points):
             return np.empty(0)
         self._function.FunctionValue(support.numpy_to_vtk(np.array(points, dtype=float, order="C")), found)
-        away = np.abs(support.vtk_to_numpy(found))
-        return np.asarray(np.where(winding_numbers(*self._surface, points) > 0, -away, away))
+        return np.asarray(np.abs(support.vtk_to_numpy(found)))
 
     def nearest(self, points: Floats) -> Floats:
         """Places on the triangles that are nearest to points, shape (n, 3), in mm; shape (n, 3).
@@ -80,6 +89,10 @@ class SignedDistances:
             self._locator.FindClosestPoint(point, place, cell, number, part, square)
             found[index] = place
         return found
+
+    @cached_property
+    def _turns(self) -> Windings:
+        return Windings(*self._surface)
 
     @cached_property
     def _locator(self) -> Any:
@@ -117,8 +130,8 @@ def vtk_module(module: str) -> Any:
         raise GyroidError(f"distances from triangles need VTK (pip install vtk): {problem}") from None
 
 
-def winding_numbers(vertices: Floats, triangles: Integers, points: Floats) -> Integers:
-    """Numbers of turns that closed triangles make round points.
+class Windings:
+    """Turns that closed triangles make round points.
 
     One inside, none outside, and others where the triangles run through themselves.
 
@@ -132,61 +145,63 @@ def winding_numbers(vertices: Floats, triangles: Integers, points: Floats) -> In
         In mm.
     triangles : ndarray of int, shape (triangles, 3)
         Counterclockwise seen from outside.
-    points : ndarray, shape (n, 3)
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
 
     Examples
     --------
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> winding_numbers(corners, sides, np.array([[0.1, 0.2, 0.3], [0.2, 0.2, -2.0]])).tolist()
+    >>> Windings(corners, sides)(np.array([[0.1, 0.2, 0.3], [0.2, 0.2, -2.0]])).tolist()
     [1, 0]
     """
-    turns = np.zeros(len(points), dtype=np.int64)
-    if not len(points) or not len(triangles):
+
+    def __init__(self, vertices: Floats, triangles: Integers) -> None:
+        self._corners, self._triangles = vertices @ _TURN, triangles
+        # Of few points at a time, as they are mostly asked, looking for boxes anew would take the most.
+        facets = self._corners[triangles]
+        self._low, self._high = facets.min(axis=1), facets.max(axis=1)
+
+    def __call__(self, points: Floats) -> Integers:
+        """Turns round points, shape (n, 3); shape (n,)."""
+        turns, own = np.zeros(len(points), dtype=np.int64), points @ _TURN
+        for triangle, point in self._above(own):
+            a, b, c = self._triangles[triangle].T
+            place = own[point]
+            left = [_left_of(self._corners, start, end, place) for start, end in ((a, b), (b, c), (c, a))]
+            up, down = np.logical_and.reduce(left), ~np.logical_or.reduce(left)
+            hit = np.flatnonzero(up | down)
+            heights = _heights(self._corners[self._triangles[triangle[hit]]], place[hit])
+            hit = hit[heights > place[hit, 2]]
+            np.add.at(turns, point[hit], np.where(up[hit], 1, -1))
         return turns
-    corners, own = vertices @ _TURN, points @ _TURN
-    for triangle, point in _below(corners[triangles], own):
-        a, b, c = triangles[triangle].T
-        place = own[point]
-        left = [_left_of(corners, start, end, place) for start, end in ((a, b), (b, c), (c, a))]
-        up, down = np.logical_and.reduce(left), ~np.logical_or.reduce(left)
-        hit = np.flatnonzero(up | down)
-        above = _heights(corners[triangles[triangle[hit]]], place[hit]) > place[hit, 2]
-        np.add.at(turns, point[hit[above]], np.where(up[hit[above]], 1, -1))
-    return turns
 
+    def _above(self, points: Floats) -> Iterator[tuple[Integers, Integers]]:
+        """Triangles with the points that they may lie over: those of the same rows of the plane, and as far along."""
+        if not len(points) or not len(self._triangles):
+            return
+        start, end = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        rows = max(1, int(np.sqrt(len(points))))
+        height = (float(end[1] - start[1]) or 1.0) / rows
+        # Rows are laid one after the other, so that each stretch of one is a stretch of the sorted places.
+        width = 2 * float(end[0] - start[0]) + 1.0
 
-def _below(corners: Floats, points: Floats) -> Iterator[tuple[Integers, Integers]]:
-    """Triangles with the points that may lie beneath them: those of the same rows of the plane, and as far along."""
-    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-    start, end = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    rows = max(1, int(np.sqrt(len(points))))
-    height = (float(end[1] - start[1]) or 1.0) / rows
-    # Rows are laid one after the other, so that each stretch of one is a stretch of the sorted places.
-    width = 2 * float(end[0] - start[0]) + 1.0
+        def row_of(y: Floats) -> Integers:
+            return np.asarray(np.clip((y - start[1]) / height, 0, rows - 1).astype(np.int64))
 
-    def row_of(y: Floats) -> Integers:
-        return np.asarray(np.clip((y - start[1]) / height, 0, rows - 1).astype(np.int64))
-
-    keys = row_of(points[:, 1]) * width + points[:, 0] - start[0]
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    met = np.all((low <= end) & (high >= start), axis=1)
-    near = np.flatnonzero(met & (corners[..., 2].max(axis=1) >= points[:, 2].min()))
-    first_row = row_of(low[near, 1])
-    which, step = numbered_groups(row_of(high[near, 1]) - first_row + 1)
-    row, near = (first_row[which] + step) * width, near[which]
-    along = [np.clip(side[near, 0] - start[0], -0.25, width - 0.5) for side in (low, high)]
-    first = np.searchsorted(keys, row + along[0], side="left")
-    count = np.maximum(np.searchsorted(keys, row + along[1], side="right") - first, 0)
-    bounds = np.searchsorted(np.cumsum(count), np.arange(_PAIRS_AT_ONCE, int(count.sum()), _PAIRS_AT_ONCE))
-    for some in np.split(np.arange(len(near)), bounds + 1):
-        which, step = numbered_groups(count[some])
-        yield near[some[which]], order[first[some[which]] + step]
+        keys = row_of(points[:, 1]) * width + points[:, 0] - start[0]
+        order = np.argsort(keys, kind="stable")
+        keys = keys[order]
+        met = np.all((self._low[:, :2] <= end) & (self._high[:, :2] >= start), axis=1)
+        near = np.flatnonzero(met & (self._high[:, 2] >= points[:, 2].min()))
+        first_row = row_of(self._low[near, 1])
+        which, step = numbered_groups(row_of(self._high[near, 1]) - first_row + 1)
+        row, near = (first_row[which] + step) * width, near[which]
+        along = [np.clip(side[near, 0] - start[0], -0.25, width - 0.5) for side in (self._low, self._high)]
+        first = np.searchsorted(keys, row + along[0], side="left")
+        count = np.maximum(np.searchsorted(keys, row + along[1], side="right") - first, 0)
+        bounds = np.searchsorted(np.cumsum(count), np.arange(_PAIRS_AT_ONCE, int(count.sum()), _PAIRS_AT_ONCE))
+        for some in np.split(np.arange(len(near)), bounds + 1):
+            which, step = numbered_groups(count[some])
+            yield near[some[which]], order[first[some[which]] + step]
 
 
 def _left_of(corners: Floats, start: Integers, end: Integers, place: Floats) -> NDArray[np.bool_]:

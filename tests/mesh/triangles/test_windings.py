@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import ConvexHull
 
-from gyroid_cad.mesh.triangles.distances import SignedDistances, winding_numbers
+from gyroid_cad.mesh.triangles.distances import SignedDistances, Windings
 
 clouds = arrays(np.float64, (9, 3), elements=st.integers(-1000, 1000).map(lambda k: k / 1000), unique=True)
 
@@ -27,7 +27,7 @@ def test_of_convex_hulls_half_spaces_tell_the_same(cloud: np.ndarray, seed: int,
     asked = np.random.default_rng(seed).uniform(-1.5, 1.5, (400, 3)) * (1.0, 1.0, 2 * flat)
     depth = np.max(asked @ normals.T + offsets, axis=1)
     clear = np.abs(depth) > 1e-9
-    assert winding_numbers(points, triangles, asked[clear]).tolist() == (depth[clear] < 0).astype(int).tolist()
+    assert Windings(points, triangles)(asked[clear]).tolist() == (depth[clear] < 0).astype(int).tolist()
     assert ((SignedDistances(points, triangles)(asked[clear]) < 0) == (depth[clear] < 0)).all()
 
 
@@ -37,6 +37,6 @@ def test_two_bodies_one_in_the_other_are_gone_round_twice() -> None:
     both = np.concatenate([corners, 3 * corners - 0.5])
     nested = np.concatenate([sides, sides + 4])
     points = np.array([[0.1, 0.1, 0.1], [-0.2, -0.2, -0.2], [-0.6, 0.0, 0.0], [9.0, 9.0, 9.0]])
-    assert winding_numbers(both, nested, points).tolist() == [2, 1, 0, 0]
-    assert winding_numbers(both, np.concatenate([sides[:, ::-1], sides + 4]), points).tolist() == [0, 1, 0, 0]
-    assert winding_numbers(both, nested, points[:0]).tolist() == []
+    assert Windings(both, nested)(points).tolist() == [2, 1, 0, 0]
+    assert Windings(both, np.concatenate([sides[:, ::-1], sides + 4]))(points).tolist() == [0, 1, 0, 0]
+    assert Windings(both, nested)(points[:0]).tolist() == []

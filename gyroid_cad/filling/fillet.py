@@ -91,8 +91,7 @@ def require_narrower(fillet: float, infill: Infill, regions: Sequence[Region]) -
     wall = infill.max_thickness
     if not region.fluid and (region.lowest is None or region.highest is None):
         # Beside a network lies all the rest, the wall too or less of it.
-        end = -(region.highest or 0.0) if region.lowest is None else region.lowest
-        wall *= -end
+        wall *= -region.end
     widest = pore_limiting_diameter(infill.grading.surface, _least_cell(infill), wall) / 2
     if fillet >= widest:
         accepted = f"below {widest:.3g} mm, half of what the pores are wide where they are narrowest"
@@ -314,7 +313,7 @@ class _Rounding:
 
     def __init__(self, spine: _Spine, boundary: SignedDistances, radius: float, step: float, below: float) -> None:
         self._spine, self._boundary, self._step, self._below = spine, boundary, step, below
-        self._radius = radius + _DIP * step**2 / (8 * radius)
+        self._asked, self._radius = radius, radius + _DIP * step**2 / (8 * radius)
         self._spacing = radius * _SPACING
         self._tree = cKDTree(spine.middles)
         self._along = unit(cross(spine.up.T, spine.off.T).T)
@@ -329,9 +328,9 @@ class _Rounding:
         a, b, c = low.tolist()
         grid = Grid((a, b, c), self._step, (x, y, z))
         if (count := float(np.prod(grid.shape))) > _MOST_POINTS:
-            possible = self._radius * (count / _MOST_POINTS) ** (2 / 3)
+            possible = self._asked * (count / _MOST_POINTS) ** (2 / 3)
             accepted = f"about {possible:.2g} mm or more in a part of this size; this one takes {count:,.0f} points"
-            raise ParameterError("fillet", self._radius, accepted)
+            raise ParameterError("fillet", self._asked, accepted)
         inside = told_apart(lambda points: furthest - np.asarray(self._tree.query(points)[0]), grid)
         near = np.argwhere(inside)
         inside[inside] = portioned(self, grid.points(near)) > 0

@@ -26,7 +26,7 @@ from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.trim.islands import SealedVoid, speck_below
+from gyroid_cad.trim.islands import SealedVoid, piece_size, speck_below
 from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
 
 __all__ = [
@@ -167,7 +167,7 @@ class Filling:
         with self.timed("check"):
             for region in self.regions:
                 self._require_right_size(infill, region, made[region.name], points)
-            domains = {name: sorted(some, key=_size, reverse=True) for name, some in made.items() if some}
+            domains = {name: sorted(some, key=piece_size, reverse=True) for name, some in made.items() if some}
             if not domains:
                 raise KernelError("nothing of the lattice lies in the part")
             self._require_simple(piece.shape for some in domains.values() for piece in some)
@@ -183,7 +183,7 @@ class Filling:
             hits = int(np.sum(infill.contains(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
         skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
-        size = sum(_size(piece) for piece in made) - skin
+        size = sum(piece_size(piece) for piece in made) - skin
         expected, deviation = hits * box, np.sqrt(hits + 1) * box
         if not abs(size - expected) <= _ESTIMATE_DEVIATIONS * deviation + _ESTIMATE_ERROR * expected:
             unit = "mm2" if region.surface else "mm3"
@@ -279,8 +279,3 @@ def part_of(given: Any) -> Part:
     """The same as one part."""
     parts, _ = bodies_of(given)
     return parts[0][1] if len(parts) == 1 else require_part(compound_of(part.shape for _, part in parts))
-
-
-def _size(made: Made) -> float:
-    """Volume, or of a bare surface its area."""
-    return made.volume or made.area

@@ -172,8 +172,8 @@ class TriangleFilling:
         with timed(self.seconds, "cut", self.progress):
             part, core = self.part.moved(-self.middle), None if self.core is None else self.core.moved(-self.middle)
             if self.regions[0].name == SHEET:
-                void = None if core is None else self._rounded(core - wall, part, core)
-                found: dict[str, Body] = {SHEET: part & wall if void is None else part - void}
+                sheet = part & wall if core is None else part - self._rounded(core - wall, part, core)
+                found: dict[str, Body] = {SHEET: sheet}
             else:
                 found = self._between(part, core, wall)
             simpler = {name: body.simplified(_SIMPLER * self.deviation) for name, body in found.items()}
@@ -205,11 +205,11 @@ class TriangleFilling:
                 for side in (region.highest is None, region.highest is not None)
             )
             # A network with more than its half of space has the wall too.
-            end = -(region.highest or 0.0) if region.lowest is None else region.lowest
-            if region.fluid or (core is None and end >= 0):
+            if region.fluid or (core is None and region.end >= 0):
                 found[region.name] = own & part
             else:
-                found[region.name] = part - self._rounded(others if end < 0 or core is None else core - own, part, core)
+                void = others if region.end < 0 or core is None else core - own
+                found[region.name] = part - self._rounded(void, part, core)
         return found
 
     def _rounded(self, void: Body, part: Body, core: Body | None) -> Body:

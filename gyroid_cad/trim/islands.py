@@ -20,6 +20,7 @@ __all__ = [
     "island_rule",
     "islands_of",
     "kept_pieces",
+    "piece_size",
     "speck_below",
     "warn_caller",
     "warn_of_voids",
@@ -181,6 +182,11 @@ def warn_caller(text: str, category: type[Warning]) -> None:
     warnings.warn(text, category, stacklevel=level)
 
 
+def piece_size(piece: Piece) -> float:
+    """Volume, or of a bare surface its area."""
+    return piece.volume or piece.area
+
+
 def without_islands(domains: dict[str, list[P]], cells: float, rule: IslandRule) -> tuple[dict[str, list[P]], Islands]:
     """Return the pieces of every domain that a rule keeps, and what is left or dropped besides the largest ones.
 
@@ -194,7 +200,7 @@ def without_islands(domains: dict[str, list[P]], cells: float, rule: IslandRule)
     """
     chosen, islands = {}, Islands()
     for name, some in domains.items():
-        sizes = [piece.volume or piece.area for piece in some]
+        sizes = [piece_size(piece) for piece in some]
         kept = kept_pieces(sizes, sum(sizes) / cells, rule)
         chosen[name] = [some[index] for index in kept]
         islands += islands_of([piece.volume for piece in some], kept)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -29,7 +30,7 @@ def test_a_step_along_the_normal_is_the_distance(name: str, crossed: bool, s: fl
     low, high = ranges[0 if crossed else 1]
     place = np.array([[s, low + share * (high - low)]])
     assert given_surface.crosses_at(place[0]) == crossed
-    surface = Quadric(given_surface.kind, given_surface.origin, given_surface.axes, 2.0, given_surface.second, crossed)
+    surface = replace(given_surface, crossed=crossed)
     normal = unit(surface.area_vectors(place))
     found, gradient, where = surface.distances(surface.points(place) + step * normal)
     assert found == pytest.approx(step, abs=1e-9)

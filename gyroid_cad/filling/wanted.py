@@ -68,7 +68,7 @@ class Region:
 
     @property
     def end(self) -> float:
-        """Where a network ends, in half walls into it: below 0 it has the wall, or some of it, too."""
+        """End of a network, in half walls from the mid-surface: below 0 it has the wall, or some of it, too."""
         return -(self.highest or 0.0) if self.lowest is None else self.lowest
 
     @property

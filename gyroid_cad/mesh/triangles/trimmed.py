@@ -143,7 +143,7 @@ def triangulated_faces(
 
 
 def _first_of(vertices: Integers, first: int) -> Integers:
-    """Where each vertex from a first one on is, all of which are there."""
+    """Places of the vertices from a first one on, all of which are there."""
     own = np.flatnonzero(vertices >= first)
     return own[np.argsort(vertices[own], kind="stable")]
 
@@ -153,7 +153,7 @@ def _first_of(vertices: Integers, first: int) -> Integers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Bending:
-    """How faces bend in a step between samples: deviations by uu, uv and vv, angles by u and v; and how large they are.
+    """Bending of faces in a step between samples: deviations by uu, uv and vv, angles by u and v; and how large they are.
 
     Their lengths in mm and their extents in parameters, along both, have shape (faces, 2).
     """
@@ -336,7 +336,7 @@ def _told_apart(work: _Work, others: Integers) -> _Work:
 
 
 def _length(work: _Work, a: Integers, b: Integers) -> Floats:
-    """How far the surface is from both ends half way between them: 0 along a pole."""
+    """Distance of the surface from both ends half way between them: 0 along a pole."""
     middle = work.surfaces.evaluated(work.owner[a], (work.places[a] + work.places[b]) / 2)[0]
     away = np.linalg.norm(middle - work.points[a], axis=1) + np.linalg.norm(middle - work.points[b], axis=1)
     return np.where(away > 1e-6 * np.abs(work.points).max(initial=1.0), away, 0.0)

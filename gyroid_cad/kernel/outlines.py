@@ -235,7 +235,7 @@ class _Faces:
         return np.array([curve.Value(t).Coord() for t in along.tolist()])
 
     def _square(self, face: int, edges: _Edges) -> tuple[int, tuple[int, int, int, int]] | None:
-        """Where the border of a whole patch begins at its lowest parameters, and its steps; None of any other face."""
+        """Corner of a whole patch's border at its lowest parameters, and the border's steps; None of any other face."""
         loops = self._loops[face]
         if len(loops) != 1 or len(loops[0]) != 4 or face not in self.domains:
             return None

@@ -153,7 +153,7 @@ def _first_of(vertices: Integers, first: int) -> Integers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Bending:
-    """Bending of faces in a step between samples: deviations by uu, uv and vv, angles by u and v; and how large they are.
+    """Bending of faces between samples: deviations by uu, uv and vv, angles by u and v; and the faces' sizes.
 
     Their lengths in mm and their extents in parameters, along both, have shape (faces, 2).
     """

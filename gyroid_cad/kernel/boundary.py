@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -149,7 +149,8 @@ def part_surface(adaptor: BRepAdaptor_Surface, extent: tuple[Floats, Floats]) ->
     if (simple := _QUADRICS.get(kind)) is not None:
         name, get, sizes = simple
         element = getattr(adaptor, get)()
-        return Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
+        quadric = Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
+        return replace(quadric, crossed=quadric.crosses_at(np.mean(extent, axis=0)))
     free = FreeForm(_derivatives(adaptor), *extent, _breaks(adaptor))
     if kind == GeomAbs_SurfaceOfExtrusion:
         direction = np.array(_values(adaptor.Direction()))

@@ -23,7 +23,8 @@ from gyroid_cad.kernel.boundary import part_surface
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, RealArray, as_edge, as_face, as_vertex, as_wire
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
-from gyroid_cad.mesh.triangles.trimmed import FaceTriangles, Outline, triangulated_faces
+from gyroid_cad.mesh.triangles.outlined import Outline
+from gyroid_cad.mesh.triangles.trimmed import FaceTriangles, triangulated_faces
 from gyroid_cad.nurbs.surface import NurbsSurface, point_derivatives
 from gyroid_cad.trim.surfaces import PartSurface
 
@@ -162,7 +163,7 @@ class _Faces:
                 self._group[index], self._member[index] = number, place
 
     def evaluated(self, faces: Integers, places: Floats) -> tuple[Floats, Floats]:
-        """As of :class:`gyroid_cad.mesh.triangles.trimmed.Surfaces`."""
+        """As of :class:`gyroid_cad.mesh.triangles.outlined.Surfaces`."""
         points, normals = np.empty((2, len(faces), 3))
         order = np.argsort(faces, kind="stable")
         own, first, counts = np.unique(faces[order], return_index=True, return_counts=True)
@@ -218,8 +219,7 @@ class _Faces:
         if square is None:
             return Outline(loops)
         turn, steps = square
-        places, numbers = (np.roll(some, -turn, axis=0) for some in loops[0])
-        return Outline([(places, numbers)], steps)
+        return Outline([(np.roll(loops[0][0], -turn, axis=0), np.roll(loops[0][1], -turn))], steps)
 
     def _places(self, face: int, number: int, edge: TopoDS_Edge, edges: _Edges) -> Floats:
         """Parameters of the places along an edge, as the edge runs."""
@@ -231,7 +231,7 @@ class _Faces:
         along = first + edges.parts(number) * (last - first)
         if curve.GetType() == GeomAbs_Line:
             line = curve.Line()
-            return np.array(line.Location().Coord()) + along[:, np.newaxis] * np.array(line.Direction().Coord())
+            return np.asarray(line.Location().Coord() + along[:, np.newaxis] * np.array(line.Direction().Coord()))
         return np.array([curve.Value(t).Coord() for t in along.tolist()])
 
     def _square(self, face: int, edges: _Edges) -> tuple[int, tuple[int, int, int, int]] | None:

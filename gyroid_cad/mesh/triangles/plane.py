@@ -14,7 +14,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["delaunay", "filled", "inner_sides", "parted", "twice_area"]
+__all__ = ["delaunay", "filled", "parted", "shared_sides", "twice_area"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -62,12 +62,12 @@ def twice_area(places: Floats, triangles: Integers) -> Floats:
     return _cross(b - a, c - a)
 
 
-def inner_sides(triangles: Integers) -> tuple[Integers, Integers]:
+def shared_sides(triangles: Integers) -> tuple[Integers, Integers]:
     """Pairs of sides that two triangles share: three times the number of each triangle, and which of its sides.
 
     Examples
     --------
-    >>> [side.tolist() for side in inner_sides(np.array([(0, 1, 2), (2, 1, 3)]))]
+    >>> [side.tolist() for side in shared_sides(np.array([(0, 1, 2), (2, 1, 3)]))]
     [[1], [3]]
     """
     starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
@@ -124,7 +124,7 @@ def parted(triangles: Integers, sides: tuple[Integers, Integers], places: Intege
     ----------
     triangles : ndarray of int, shape (triangles, 3)
     sides : tuple of ndarray of int
-        As :func:`inner_sides` gives them.
+        As :func:`shared_sides` gives them.
     places : ndarray of int
         Number of the new place on each.
 
@@ -138,7 +138,7 @@ def parted(triangles: Integers, sides: tuple[Integers, Integers], places: Intege
     Examples
     --------
     >>> two = np.array([(0, 1, 2), (2, 1, 3)])
-    >>> parted(two, inner_sides(two), np.array([4]))[0].tolist()
+    >>> parted(two, shared_sides(two), np.array([4]))[0].tolist()
     [[1, 4, 0], [2, 4, 3], [4, 2, 0], [4, 1, 3]]
     """
     found, new, origin = triangles.copy(), [], []
@@ -162,7 +162,7 @@ def _apart(count: int, one: Integers, other: Integers, gain: Floats) -> Booleans
 
 def _exchangeable(places: Floats, triangles: Integers) -> tuple[Integers, Integers, Floats]:
     """Inner sides that the other diagonal should replace, and by how much the angles opposite are too wide."""
-    one, other = inner_sides(triangles)
+    one, other = shared_sides(triangles)
     (a, b, c), d = _from_side(triangles, one), _from_side(triangles, other)[2]
     pa, pb, pc, pd = places[a], places[b], places[c], places[d]
     across_c, along_c = _cross(pa - pc, pb - pc), np.sum((pa - pc) * (pb - pc), axis=1)

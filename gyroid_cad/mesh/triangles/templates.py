@@ -18,6 +18,7 @@ __all__ = [
     "FEWEST_STEPS",
     "Template",
     "face_template",
+    "few_counts",
     "grid_triangles",
     "wall_template",
 ]
@@ -28,6 +29,8 @@ Integers = NDArray[np.int64]
 # One place at least lies inside a patch: what the strips along its edges are stitched to.
 FEWEST_STEPS = 2
 _REMEMBERED = 256
+# Where counts are more than these they are rounded up to three binary digits, so that few templates are needed.
+_FEW_COUNTS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +93,20 @@ def wall_template(along: int, across: int) -> Template:
     u, v = np.linspace(-1, 1, along + 1), np.linspace(0, 1, across + 1)
     places = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
     return _template(places, grid_triangles(np.arange(len(places)).reshape(along + 1, across + 1)))
+
+
+def few_counts(steps: Integers) -> Integers:
+    """Steps as they are where few numbers occur, else rounded up to three binary digits.
+
+    Examples
+    --------
+    >>> few_counts(np.array([2, 3, 9])).tolist(), few_counts(np.arange(6, 12)).tolist()
+    ([2, 3, 9], [6, 7, 8, 10, 10, 12])
+    """
+    if len(np.unique(steps)) <= _FEW_COUNTS:
+        return steps
+    unit = 2 ** np.maximum(0, np.floor(np.log2(steps)).astype(np.int64) - 2)
+    return np.asarray(-(-steps // unit) * unit)
 
 
 def _template(places: Floats, triangles: Integers) -> Template:

@@ -138,19 +138,8 @@ def _of_volume(made: _Placed, surfaces: Surfaces, first: int) -> Floats:
     middles of its sides. The vertices of a face, from a first number on, all move by as much, never further than the
     triangles are off: those along borders, which other faces have too, stay.
     """
-    vertices, triangles, faces, corners = made.vertices, made.triangles, made.faces, made.corners
-    ahead = np.roll(triangles, -1, axis=1)
-    middles = ((corners + np.roll(corners, -1, axis=1)) / 2).reshape(-1, 2)
-    one, other = shared_sides(triangles)
-    within = faces[one // 3] == faces[other // 3]
-    twin = np.arange(triangles.size)
-    twin[other[within]] = one[within]
-    own = np.flatnonzero(twin == np.arange(triangles.size))
-    found, normals = surfaces.evaluated(np.repeat(faces, 3)[own], middles[own])
-    chords = (vertices[triangles] + vertices[ahead]).reshape(-1, 3)[own] / 2
-    by_side = np.zeros(triangles.size)
-    by_side[own] = dot(chords - found, unit(normals))
-    off = by_side[twin].reshape(-1, 3)
+    vertices, triangles, faces = made.vertices, made.triangles, made.faces
+    off = _sides_off(made, surfaces)
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     inside = triangles >= first
@@ -159,17 +148,28 @@ def _of_volume(made: _Placed, surfaces: Surfaces, first: int) -> Floats:
     movable = np.bincount(faces, area * inside.sum(axis=1), count)
     furthest = np.zeros(count)
     np.maximum.at(furthest, faces, np.abs(off).max(axis=1))
-    moved = np.clip(-excess / np.maximum(movable, np.finfo(float).tiny), -furthest, furthest)
+    by = np.divide(-excess, movable, out=np.zeros(count), where=movable > 0).clip(-furthest, furthest)
     owner, places = np.zeros(len(vertices), dtype=np.int64), np.zeros((len(vertices), 2))
     owner[triangles[inside]] = np.repeat(faces, inside.sum(axis=1))
-    places[triangles[inside]] = corners[inside]
-    return np.concatenate(
-        [
-            vertices[:first],
-            vertices[first:]
-            + moved[owner[first:], np.newaxis] * unit(surfaces.evaluated(owner[first:], places[first:])[1]),
-        ]
-    )
+    places[triangles[inside]] = made.corners[inside]
+    normals = unit(surfaces.evaluated(owner[first:], places[first:])[1])
+    return np.concatenate([vertices[:first], vertices[first:] + by[owner[first:], np.newaxis] * normals])
+
+
+def _sides_off(made: _Placed, surfaces: Surfaces) -> Floats:
+    """Distances of the middles of triangles' sides from the surface, along its normals; shape (triangles, 3)."""
+    triangles, faces = made.triangles, made.faces
+    one, other = shared_sides(triangles)
+    within = faces[one // 3] == faces[other // 3]
+    twin = np.arange(triangles.size)
+    twin[other[within]] = one[within]
+    own = np.flatnonzero(twin == np.arange(triangles.size))
+    places = (made.corners + np.roll(made.corners, -1, axis=1)).reshape(-1, 2)[own] / 2
+    found, normals = surfaces.evaluated(np.repeat(faces, 3)[own], places)
+    chords = (made.vertices[triangles] + made.vertices[np.roll(triangles, -1, axis=1)]).reshape(-1, 3)[own] / 2
+    off = np.zeros(triangles.size)
+    off[own] = dot(chords - found, unit(normals))
+    return np.asarray(off[twin].reshape(-1, 3))
 
 
 # Whole patches --------------------------------------------------------------------------------------------------------

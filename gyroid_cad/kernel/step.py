@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,6 +30,8 @@ from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
+from gyroid_cad.kernel.step_geometry import UnknownGeometryError
+from gyroid_cad.kernel.step_products import Occurrence, StepPart, products_of, time_stamp, write_products
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -212,6 +214,13 @@ def write_step(
     ParameterError, ExportError
     """
     product = product_name(path, name)
+    require_schema(schema)
+    if not parameter_curves:
+        try:
+            write_parts(shape, path, schema, product, *products_of(shape, product))
+            return
+        except UnknownGeometryError:
+            pass
     with step_of_kernel(shape, path, schema, product, parameter_curves) as raw:
         writer = STEPControl_Writer()
         if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
@@ -220,6 +229,25 @@ def write_step(
         _name_product(writer, product)
         if writer.Write(str(raw)) != IFSelect_RetDone:
             raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+
+
+def write_parts(
+    shape: TopoDS_Shape,
+    path: str | os.PathLike[str],
+    schema: Schema,
+    product: str,
+    parts: Sequence[StepPart],
+    places: Sequence[Occurrence] = (),
+) -> None:
+    """Write parts that were read from a shape, and look whether the file holds it all.
+
+    Raises
+    ------
+    ExportError
+    """
+    with replacing(path) as temporary:
+        write_products(temporary, product, parts, places, schema)
+        _require_whole(path, temporary, shape)
 
 
 @contextmanager

@@ -29,6 +29,7 @@ from benchmarks.timing import ROOT, arguments_for, fresh_python, plain_table
 from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.step import read_step, topology_in_step, write_step
+from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.wall.covering import AT_HOME, periodic_offsets
 
@@ -200,10 +201,8 @@ def _expected(part: str, cell: float, skin: float, kind: str) -> float:
     else:
         held = (np.abs(offsets) < half) != (kind == "channels")
     if skin:
-        from gyroid_cad.mesh.triangles.measures import SignedDistances
-
         in_skin = SignedDistances(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3))
-        near = np.abs(in_skin(points)) < skin
+        near = in_skin.away(points) < skin
         held = held & ~near if kind == "channels" else held | near
     return float(held.sum()) * step**3
 

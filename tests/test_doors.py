@@ -254,6 +254,10 @@ CASES: dict[str, dict[str, Case]] = {
             {"file": "made.stl", "route": "triangles", "deviation": 0.2},
             lambda made, usual: sized(made, usual) and (told(made, "no B-rep was made") or made.report["faces"] < 4000),
         ),
+        "fillet": Case(
+            {"file": "made.stl", "route": "triangles", "deviation": 0.2, "skin": 0.5, "fillet": 0.3},
+            lambda made, usual: made.triangles > 4000,
+        ),
         "repair": Case(
             {"file": "made.stl", "route": "triangles", "deviation": 0.2, "repair": True},
             sized,

@@ -54,7 +54,7 @@ BREP, TRIANGLES = ROUTES
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
     *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
-    *("repair", "material_density", "partial"),
+    *("fillet", "repair", "material_density", "partial"),
 )
 
 
@@ -111,6 +111,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     shell_complete=file_paths,
     help="Instead of --skin, the inner solid that is filled, of a STEP or BREP file: the skin is the part less it.",
 )
+@click.option("--fillet", type=float, metavar="MM", help="Round the corners where infill and skin meet, of triangles.")
 @click.option(
     "--solid",
     multiple=True,
@@ -185,6 +186,9 @@ def fill_command(
     if settings["route"] == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         settings["deviation"], written = given["deviation"], {}
+    elif given["fillet"] is not None:
+        accepted = "none at --route brep, whose solids have sharp corners there; --route triangles rounds them"
+        raise ParameterError("fillet", given["fillet"], accepted)
     with shown_progress(not quiet, lines=True) as progress:
         try:
             filled = fill(part, progress=progress, **settings)

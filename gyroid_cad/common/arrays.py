@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Point", "cross", "dot", "freeze_arrays", "unit"]
+__all__ = ["Point", "cross", "dot", "freeze_arrays", "numbered_groups", "unit"]
 
 # As users give it, and reports tell it.
 Point = tuple[float, float, float]
@@ -48,3 +48,13 @@ def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
            [0. , 0. ]])
     """
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(float).tiny))
+
+
+def numbered_groups(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Members of groups of so many each: the group of each member, and its number in there.
+
+    >>> [some.tolist() for some in numbered_groups(np.array([2, 0, 3]))]
+    [[0, 0, 2, 2, 2], [0, 1, 0, 1, 2]]
+    """
+    group = np.repeat(np.arange(len(counts)), counts)
+    return group, np.arange(len(group)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -144,6 +144,7 @@ FILL = (
     _row("skin"),
     _row("openings", "--opening"),
     _row("core"),
+    _row("fillet", **_NO_TRIANGLES),
     _row("solids", "--solid"),
     _row("partial"),
     _row("origin"),

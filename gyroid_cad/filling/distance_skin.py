@@ -52,11 +52,14 @@ class Shell:
         In mm.
     openings : sequence
     core : shape, Workplane or path-like, optional
+    fillet : float, optional
+        Radius in mm where the lattice meets it.
     """
 
     skin: float | None = None
     openings: Sequence[Any] = ()
     core: Any = None
+    fillet: float | None = None
 
     def core_of(
         self, part: TrianglePart, opened: Booleans | None, deviation: float
@@ -88,7 +91,7 @@ class _Depth:
         signed = self._signed(points)
         if not self._open:
             return -signed - self._skin
-        return np.minimum(np.abs(self._walls(points)) - self._skin, _BEYOND * self._skin - signed)
+        return np.minimum(self._walls.away(points) - self._skin, _BEYOND * self._skin - signed)
 
     def normals(self, points: Floats) -> Floats:
         """Out of the core: towards the nearest place of the skin's outside, or away from that of an opening."""

@@ -20,9 +20,10 @@ from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.distance_skin import Shell
+from gyroid_cad.filling.fillet import checked_fillet
 from gyroid_cad.filling.forecast import require_cover
 from gyroid_cad.filling.infill import described_infill
-from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_islands, without_specks
+from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_specks
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
@@ -30,8 +31,8 @@ from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, chec
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
-from gyroid_cad.kernel.part import Part, require_part, selected_faces
-from gyroid_cad.kernel.skin import Hollow, has_face, hollow_round
+from gyroid_cad.kernel.part import Part
+from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
@@ -40,7 +41,7 @@ from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids
+from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.parameters import valid_tolerance
 
@@ -187,6 +188,7 @@ def fill(
     skin: float | None = None,
     openings: Sequence[Any] = (),
     core: Any = None,
+    fillet: float | None = None,
     tolerance: float | None = None,
     lattice: Lattice | None = None,
     surface: SurfaceName = "gyroid",
@@ -233,6 +235,8 @@ def fill(
     core : shape, Workplane or path-like, optional
         Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
         core, open wherever the core comes to the part's boundary.
+    fillet : float, optional
+        Radius in mm of the fillets where the infill meets the skin, at the route of triangles.
     tolerance : float, optional
         Largest deviation in cell sizes; 1e-4 of a graded wall if left out.
     lattice : Lattice, optional
@@ -281,7 +285,8 @@ def fill(
     rule = island_rule(keep_islands, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
-    require_route(route, deviation=deviation, repair=repair)
+    require_route(route, deviation=deviation, repair=repair, fillet=fillet)
+    radius = checked_fillet(fillet, shell, core)
     regions, size, settings, foreseen, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
@@ -290,7 +295,7 @@ def fill(
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
         job = TriangleJob(kind, size, regions, infill_in, *given)
         # Not of the class, but with all of it that needs no B-rep.
-        return job.filled(part, solids, repair, Shell(shell, openings, core))  # type: ignore[return-value]
+        return job.filled(part, solids, repair, Shell(shell, openings, core, radius))  # type: ignore[return-value]
     report_progress(progress, "read", 0, 1)
     parts, remarks = bodies_of(part, solids)
     report_progress(progress, "read", 1, 1)
@@ -299,7 +304,7 @@ def fill(
     for remark in remarks:
         warn_caller(remark, PartWarning)
     made, islands = [], Islands()
-    for (name, whole), faces in zip(parts, _opened(parts, openings), strict=True):
+    for (name, whole), faces in zip(parts, opened_faces(parts, openings), strict=True):
         told = progress if len(parts) == 1 else named_progress(progress, name)
         forecast = foreseen(whole)
         report_progress(told, str(forecast), 0, round(forecast.seconds))
@@ -328,14 +333,6 @@ def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) 
     except ParameterError as refused:
         raise ParameterError("core", refused.value, refused.accepted) from None
     return hollow_round(part, inner)
-
-
-def _opened(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[list[Any]]:
-    """The faces of each part that a user's openings are: selectors are asked of all of them together."""
-    if len(parts) == 1 or not openings:
-        return [selected_faces(part, openings) for _, part in parts]
-    faces = selected_faces(require_part(compound_of(part.shape for _, part in parts)), openings)
-    return [[face for face in faces if has_face(part, face)] for _, part in parts]
 
 
 def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:

@@ -26,7 +26,7 @@ from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.trim.islands import IslandRule, Islands, SealedVoid, islands_of, kept_pieces, speck_below
+from gyroid_cad.trim.islands import SealedVoid, piece_size, speck_below
 from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
 
 __all__ = [
@@ -37,7 +37,6 @@ __all__ = [
     "part_of",
     "shapes_of",
     "solid_names",
-    "without_islands",
     "without_specks",
 ]
 
@@ -168,7 +167,7 @@ class Filling:
         with self.timed("check"):
             for region in self.regions:
                 self._require_right_size(infill, region, made[region.name], points)
-            domains = {name: sorted(some, key=_size, reverse=True) for name, some in made.items() if some}
+            domains = {name: sorted(some, key=piece_size, reverse=True) for name, some in made.items() if some}
             if not domains:
                 raise KernelError("nothing of the lattice lies in the part")
             self._require_simple(piece.shape for some in domains.values() for piece in some)
@@ -184,7 +183,7 @@ class Filling:
             hits = int(np.sum(infill.contains(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
         skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
-        size = sum(_size(piece) for piece in made) - skin
+        size = sum(piece_size(piece) for piece in made) - skin
         expected, deviation = hits * box, np.sqrt(hits + 1) * box
         if not abs(size - expected) <= _ESTIMATE_DEVIATIONS * deviation + _ESTIMATE_ERROR * expected:
             unit = "mm2" if region.surface else "mm3"
@@ -200,28 +199,6 @@ class Filling:
         if not (valid and closed):
             state = "valid" if valid else "invalid"
             raise KernelError(f"the kernel's filled part is {state}, with {counted.open_edges} open edges")
-
-
-def without_islands(
-    domains: dict[str, list[Made]], cells: float, rule: IslandRule
-) -> tuple[dict[str, list[Made]], Islands]:
-    """Return the pieces of every domain that a rule keeps, and what is left or dropped besides the largest ones.
-
-    Parameters
-    ----------
-    domains : dict
-        As of :class:`Outcome`.
-    cells : float
-        How many cells what is filled is as large as.
-    rule : IslandRule
-    """
-    chosen, islands = {}, Islands()
-    for name, some in domains.items():
-        sizes = [_size(piece) for piece in some]
-        kept = kept_pieces(sizes, sum(sizes) / cells, rule)
-        chosen[name] = [some[index] for index in kept]
-        islands += islands_of([piece.volume for piece in some], kept)
-    return chosen, islands
 
 
 def without_specks(
@@ -302,8 +279,3 @@ def part_of(given: Any) -> Part:
     """The same as one part."""
     parts, _ = bodies_of(given)
     return parts[0][1] if len(parts) == 1 else require_part(compound_of(part.shape for _, part in parts))
-
-
-def _size(made: Made) -> float:
-    """Volume, or of a bare surface its area."""
-    return made.volume or made.area

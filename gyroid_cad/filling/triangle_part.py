@@ -41,6 +41,7 @@ _SHARED = 1e-6
 # What is expected at the route of exact solids, of what it has no use for.
 _AT_BREP = {
     "deviation": "none at route brep, whose solids write(deviation=...) meshes",
+    "fillet": 'none at route brep, whose solids have sharp corners there; route="triangles" rounds them',
     "repair": "none at route brep, which repairs what it can by itself",
 }
 

@@ -17,6 +17,7 @@ from gyroid_cad.common.formats import STL, THREE_MF, TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import KernelError, ParameterError, PartWarning
 from gyroid_cad.filling.distance_skin import Shell, opened_facets, without_small_voids
+from gyroid_cad.filling.fillet import require_narrower, rounded
 from gyroid_cad.filling.infill import Infill, InfillIn
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import TrianglePart, triangle_part
@@ -32,11 +33,10 @@ from gyroid_cad.trim.islands import (
     IslandRule,
     Islands,
     SealedVoid,
-    islands_of,
-    kept_pieces,
     speck_below,
     warn_caller,
     warn_of_voids,
+    without_islands,
 )
 from gyroid_cad.wall.covering import Frame
 from gyroid_cad.wall.grading import THINNEST_WALL
@@ -142,6 +142,8 @@ class TriangleFilling:
     infill : Infill
     deviation : float
         Of triangles from the lattice, in mm.
+    fillet, skin : float, optional
+        Radius where the lattice meets the skin, and how thin that is at least, in mm.
     progress : callable, optional
     seconds : dict
         By stage.
@@ -152,6 +154,8 @@ class TriangleFilling:
     regions: tuple[Region, ...]
     infill: Infill
     deviation: float
+    fillet: float | None
+    skin: float | None
     progress: Progress | None
     seconds: dict[str, float]
 
@@ -168,7 +172,8 @@ class TriangleFilling:
         with timed(self.seconds, "cut", self.progress):
             part, core = self.part.moved(-self.middle), None if self.core is None else self.core.moved(-self.middle)
             if self.regions[0].name == SHEET:
-                found: dict[str, Body] = {SHEET: part & wall if core is None else part - (core - wall)}
+                sheet = part & wall if core is None else part - self._rounded(core - wall, part, core)
+                found: dict[str, Body] = {SHEET: sheet}
             else:
                 found = self._between(part, core, wall)
             simpler = {name: body.simplified(_SIMPLER * self.deviation) for name, body in found.items()}
@@ -190,7 +195,8 @@ class TriangleFilling:
 
     def _between(self, part: Body, core: Body | None, wall: Body) -> dict[str, Body]:
         """Networks or channels: pieces that the wall leaves, by the side of it that they are on."""
-        pieces = ((part if core is None else core) - wall).pieces()
+        left = (part if core is None else core) - wall
+        pieces = (self._rounded(left, part, core) if self.regions[0].fluid else left).pieces()
         above = self._above(pieces)
         found = {}
         for region in self.regions:
@@ -199,12 +205,19 @@ class TriangleFilling:
                 for side in (region.highest is None, region.highest is not None)
             )
             # A network with more than its half of space has the wall too.
-            end = -(region.highest or 0.0) if region.lowest is None else region.lowest
-            if region.fluid or core is None:
-                found[region.name] = part - others if end < 0 and not region.fluid else own & part
+            if region.fluid or (core is None and region.end >= 0):
+                found[region.name] = own & part
             else:
-                found[region.name] = part - others if end < 0 else part - (core - own)
+                void = others if region.end < 0 or core is None else core - own
+                found[region.name] = part - self._rounded(void, part, core)
         return found
+
+    def _rounded(self, void: Body, part: Body, core: Body | None) -> Body:
+        """Space that a lattice leaves, its corners along the skin filled if they are to be."""
+        if core is None or self.fillet is None:
+            return void
+        with timed(self.seconds, "fillet", self.progress):
+            return rounded(void, part, core, self.skin, self.fillet, self.deviation)
 
     def _above(self, pieces: Sequence[Body]) -> list[bool]:
         """Tell which pieces lie on the side of the mid-surface that its normals point to, by the vertices of each."""
@@ -307,13 +320,14 @@ class TriangleJob:
         infill = self.infill_in(inner, self.frame, lambda stage: timed(seconds, stage, self.progress), least)
         wall = self.cell_size if network else infill.max_thickness
         deviation = self.deviation or min(self._fineness, wall / _USUAL_OF_WALL)
-        filling = TriangleFilling(
-            part.body, None if core is None else core.body, self.regions, infill, deviation, self.progress, seconds
-        )
+        if shell.fillet is not None:
+            require_narrower(shell.fillet, infill, self.regions)
+        bodies = part.body, None if core is None else core.body
+        filling = TriangleFilling(*bodies, self.regions, infill, deviation, shell.fillet, skin, self.progress, seconds)
         domains = filling.domains()
         with timed(seconds, "check", self.progress):
             pieces = {name: body.pieces() for name, body in domains.items()}
-            kept, islands = _without_islands(pieces, inner.body.volume / self.cell_size**3, self.rule)
+            kept, islands = without_islands(pieces, inner.body.volume / self.cell_size**3, self.rule)
             left = [piece for some in kept.values() for piece in some]
             voids: list[SealedVoid] = []
             if not any(region.fluid for region in self.regions):
@@ -364,19 +378,6 @@ class TriangleJob:
             route=TRIANGLES,
             deviation=filling.deviation,
         )
-
-
-def _without_islands(
-    domains: dict[str, list[Body]], cells: float, rule: IslandRule
-) -> tuple[dict[str, list[Body]], Islands]:
-    """The pieces of every domain that a rule keeps, and what is left or dropped besides the largest ones."""
-    chosen, islands = {}, Islands()
-    for name, some in domains.items():
-        volumes = [piece.volume for piece in some]
-        kept = kept_pieces(volumes, sum(volumes) / cells, rule)
-        chosen[name] = [some[index] for index in kept]
-        islands += islands_of(volumes, kept)
-    return chosen, islands
 
 
 def _arrays(pieces: Sequence[Body], middle: Floats, deviation: float) -> tuple[Floats, Integers]:

@@ -67,6 +67,11 @@ class Region:
         return np.asarray((offsets > low) & (offsets < high))
 
     @property
+    def end(self) -> float:
+        """End of a network, in half walls from the mid-surface: below 0 it has the wall, or some of it, too."""
+        return -(self.highest or 0.0) if self.lowest is None else self.lowest
+
+    @property
     def sides(self) -> list[tuple[int, bool]]:
         """The wall's faces, 0 or 1, that bound the region, each with whether it runs against the common normal."""
         if self.surface:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -141,7 +141,8 @@ def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> PartSurface:
     if (simple := _QUADRICS.get(kind)) is not None:
         name, get, sizes = simple
         element = getattr(adaptor, get)()
-        return Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
+        quadric = Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
+        return replace(quadric, crossed=quadric.crosses_at(np.mean(face.range, axis=0)))
     free = FreeForm(_derivatives(adaptor), *face.range, _breaks(adaptor))
     if kind == GeomAbs_SurfaceOfExtrusion:
         direction = np.array(_values(adaptor.Direction()))

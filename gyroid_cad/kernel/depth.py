@@ -100,7 +100,7 @@ class NearDistances:
 
     def __call__(self, points: Floats, level: float | None = None) -> Floats:
         """Distances of points, shape (n, 3), in mm, exact about another level if one is given; shape (n,)."""
-        found = np.abs(self._triangles(points))
+        found = self._triangles.away(points)
         near = np.abs(found - (self._level if level is None else level)) < self._band
         found[near] = self._exact.distances(points[near])
         return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +26,11 @@ from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import core_of
-from gyroid_cad.kernel.part import Part, measure, require_part
+from gyroid_cad.kernel.part import Part, measure, require_part, selected_faces
 from gyroid_cad.kernel.sieve import with_changes
 from gyroid_cad.kernel.split import Pieces, general_fuse, inner_sides, modified, solids_of
 
-__all__ = ["Hollow", "has_face", "hollow", "hollow_round", "openings_of"]
+__all__ = ["Hollow", "hollow", "hollow_round", "opened_faces", "openings_of"]
 
 Floats = NDArray[np.float64]
 
@@ -220,7 +221,26 @@ def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
     return [faces[k] for k in sorted(found)]
 
 
-def has_face(part: Part, face: TopoDS_Face) -> bool:
+def opened_faces(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[list[TopoDS_Face]]:
+    """The faces of each part that a user's openings are: selectors are asked of all of them together.
+
+    Parameters
+    ----------
+    parts : sequence of (str, Part)
+    openings : sequence
+        As of :func:`gyroid_cad.fill`.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if len(parts) == 1 or not openings:
+        return [selected_faces(part, openings) for _, part in parts]
+    faces = selected_faces(require_part(compound_of(part.shape for _, part in parts)), openings)
+    return [[face for face in faces if _has_face(part, face)] for _, part in parts]
+
+
+def _has_face(part: Part, face: TopoDS_Face) -> bool:
     """Tell whether a face is one of the part's, or has some of these lying on it."""
     faces = _faces_of(part.shape)
     return any(own.IsSame(face) for own in faces) or bool(_lying_on(face, faces))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import freeze_arrays
+from gyroid_cad.common.arrays import freeze_arrays, numbered_groups
 
 __all__ = ["NOTHING", "Slopes", "nearest_triangles", "slopes"]
 
@@ -113,8 +113,8 @@ def nearest_triangles(corners: Floats, width: int, height: int) -> Integers:
     depth = slopes(corners, z)
     seen = np.full(width * height, _FARTHEST, dtype=np.uint64)
     for which, row, column, count in _rows(corners, width, height):
-        along = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        triangle = np.repeat(which, count)
+        some, along = numbered_groups(count)
+        triangle = which[some]
         start = depth.at(which, column, row).astype(float)
         place = np.repeat(start, count) + along * np.repeat(depth.along_x[which], count)
         # Of triangles seen nearly edge-on rounding would put some in front of everything.
@@ -141,12 +141,13 @@ def _rows(corners: Floats, width: int, height: int) -> Iterator[tuple[Integers, 
         stop = max(start + 1, int(np.searchsorted(ends, done + _AT_ONCE, side="right")))
         which, count = some[start:stop], counts[start:stop]
         start = stop
-        row = np.arange(count.sum()) + np.repeat(first[which] - np.cumsum(count) + count, count)
-        left, right = _crossings(corners[which], count, row + 0.5)
+        group, step = numbered_groups(count)
+        row = first[which[group]] + step
+        left, right = _crossings(corners[which], count, np.asarray(row + 0.5))
         column = _first_middle(left, width)
         samples = _first_middle(right, width) - column
         hit = np.flatnonzero(samples > 0)
-        yield np.repeat(which, count)[hit], row[hit], column[hit], samples[hit]
+        yield which[group[hit]], row[hit], column[hit], samples[hit]
 
 
 def _crossings(corners: Floats, count: Integers, y: Floats) -> tuple[Floats, Floats]:

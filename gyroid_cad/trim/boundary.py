@@ -135,7 +135,8 @@ class BoundaryFace:
             [coedge.curve(np.linspace(coedge.first, coedge.last, _LEAST))[0] for coedge in self.coedges]
         )
         scale = np.maximum(np.ptp(points, axis=0), np.finfo(float).tiny)
-        points = np.concatenate([coedge.polygon(_SAGS[0], scale) for coedge in self.coedges])
+        # What lies beyond is cut off where areas are measured: a polygon of a thousandth's sag lost 1e-5 of a disc.
+        points = np.concatenate([coedge.polygon(_SAGS[1], scale) for coedge in self.coedges])
         return points.min(axis=0), points.max(axis=0)
 
     def unwound(self, places: Floats, near: Floats | None = None) -> Floats:

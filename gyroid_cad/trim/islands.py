@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
+from typing import Literal, Protocol, TypeVar
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.errors import IslandsWarning, ParameterError, SealedVoidsWarning
@@ -20,11 +20,24 @@ __all__ = [
     "island_rule",
     "islands_of",
     "kept_pieces",
+    "piece_size",
     "speck_below",
     "warn_caller",
     "warn_of_voids",
+    "without_islands",
 ]
 
+
+class Piece(Protocol):
+    """A solid with its volume in mm3, or a shell without any, and its area in mm2."""
+
+    @property
+    def volume(self) -> float: ...
+    @property
+    def area(self) -> float: ...
+
+
+P = TypeVar("P", bound=Piece)
 IslandRule = Literal["drop small", "drop all", "keep all"]
 
 # A small island has less than this part of what one cell holds, and of the largest piece. The chips at two corners of
@@ -167,3 +180,28 @@ def warn_caller(text: str, category: type[Warning]) -> None:
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
     warnings.warn(text, category, stacklevel=level)
+
+
+def piece_size(piece: Piece) -> float:
+    """Volume, or of a bare surface its area."""
+    return piece.volume or piece.area
+
+
+def without_islands(domains: dict[str, list[P]], cells: float, rule: IslandRule) -> tuple[dict[str, list[P]], Islands]:
+    """Return the pieces of every domain that a rule keeps, and what is left or dropped besides the largest ones.
+
+    Parameters
+    ----------
+    domains : dict
+        Pieces by the name of their region.
+    cells : float
+        How many cells what is filled is as large as.
+    rule : IslandRule
+    """
+    chosen, islands = {}, Islands()
+    for name, some in domains.items():
+        sizes = [piece_size(piece) for piece in some]
+        kept = kept_pieces(sizes, sum(sizes) / cells, rule)
+        chosen[name] = [some[index] for index in kept]
+        islands += islands_of([piece.volume for piece in some], kept)
+    return chosen, islands

@@ -294,7 +294,7 @@ def _heights(faces: LatticeFaces, face: Integers, points: Floats) -> tuple[Float
     along = np.linspace(-1, 1, _STARTS)
     starts = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
     used, which = np.unique(face, return_inverse=True)
-    grid = faces.on_grid(used, _STARTS).reshape(len(used), -1, 3)[which]
+    grid = faces.on_grid(used, _STARTS).reshape(len(used), _STARTS**2, 3)[which]
     nearest = np.stack(
         [np.argmin(np.sum((grid - points[:, k, None]) ** 2, axis=-1), axis=1) for k in range(points.shape[1])], axis=1
     )

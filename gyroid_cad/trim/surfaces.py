@@ -74,6 +74,9 @@ class Quadric:
         Its directions x, y and z, in the rows.
     radius, second : float
         Of a torus the larger and the smaller one; of a cone the radius at the origin, and half the angle, in radians.
+    crossed : bool
+        Whether it is looked at where its profile has crossed the axis: past a cone's apex, or the inner sheet of a
+        torus whose smaller radius is the larger one.
     """
 
     kind: QuadricKind
@@ -81,18 +84,21 @@ class Quadric:
     axes: Floats
     radius: float = 0.0
     second: float = 0.0
+    crossed: bool = False
 
     def distances(self, points: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """As of :class:`PartSurface`."""
         own = (points - self.origin) @ self.axes.T
         x, y, z = own.T
         if self.kind == "plane":
-            return z, np.broadcast_to(self.axes[2], own.shape), own[:, :2]
-        along = np.hypot(x, y)
-        safe = np.maximum(along, np.finfo(float).tiny)
+            return self._handed * z, np.broadcast_to(self._handed * self.axes[2], own.shape), own[:, :2]
+        # Past the axis a meridian is that of the opposite angle, at a negative distance.
+        side = -1.0 if self.crossed else 1.0
+        along = side * np.hypot(x, y)
+        safe = np.where(along, along, side * np.finfo(float).tiny)
         radial = np.stack([x / safe, y / safe, np.zeros_like(x)], axis=-1)
         upwards = np.array([0.0, 0.0, 1.0])
-        angle = np.arctan2(y, x)
+        angle = np.arctan2(side * y, side * x)
         if self.kind == "cylinder":
             found, gradient, height = along - self.radius, radial, z
         elif self.kind == "cone":
@@ -105,7 +111,7 @@ class Quadric:
             out = along - self.radius
             found, height = np.hypot(out, z) - self.second, np.arctan2(z, out)
             gradient = unit(out[:, np.newaxis] * radial + z[:, np.newaxis] * upwards)
-        sign = self._handed
+        sign = side * self._handed
         return sign * found, sign * gradient @ self.axes, np.stack([angle, height], axis=-1)
 
     def roughly(self, points: Floats) -> tuple[Floats, Floats]:
@@ -141,13 +147,17 @@ class Quadric:
             own = minor * self._profile(t)[0][:, np.newaxis] * outwards
         return np.asarray(self._handed * own @ self.axes)
 
+    def crosses_at(self, place: Floats) -> bool:
+        """Tell whether the profile has crossed the axis at parameters, shape (2,)."""
+        return self.kind != "plane" and float(self._profile(place[1:])[0][0]) < 0
+
     @property
     def _handed(self) -> float:
         """-1 if the axes are left-handed: then the normal of the parameters points inwards."""
         return 1.0 if np.linalg.det(self.axes) > 0 else -1.0
 
     def _profile(self, t: Floats) -> tuple[Floats, Floats]:
-        """Distance from the axis, and along it."""
+        """Distance from the axis, negative where the meridian has crossed it, and along it."""
         if self.kind == "cylinder":
             return np.full_like(t, self.radius), t
         if self.kind == "cone":

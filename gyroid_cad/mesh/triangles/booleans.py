@@ -133,6 +133,17 @@ class Body:
         vertices = np.array(mesh.vert_properties[:, :3])
         return vertices, np.asarray(mesh.tri_verts, dtype=np.int64)
 
+    def origins(self) -> Integers:
+        """Number of the body that each triangle was part of before bodies were combined; shape (triangles,).
+
+        >>> cube, other = (body_of(*Body(Manifold.cube((2, 2, 2))).triangles()) for _ in range(2))
+        >>> corner = cube - other.moved(np.ones(3))
+        >>> int(np.isin(corner.origins(), cube.origins()).sum()), int(np.isin(corner.origins(), other.origins()).sum())
+        (18, 6)
+        """
+        mesh = self.manifold.to_mesh64()
+        return np.repeat(np.asarray(mesh.run_original_id, dtype=np.int64), np.diff(mesh.run_index) // 3)
+
     def simplified(self, tolerance: float) -> Body:
         """The body with fewer triangles, no vertex moved further than a tolerance in mm."""
         return Body(self.manifold.simplify(tolerance))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
 
-__all__ = ["Grid", "level_surface", "told_apart"]
+__all__ = ["Grid", "level_surface", "portioned", "told_apart"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -66,7 +66,7 @@ def told_apart(function: Function, grid: Grid) -> Booleans:
     inside = np.zeros(grid.shape, dtype=bool)
     blocks = _within(np.zeros((1, 3), dtype=np.int64), max(grid.shape), _BLOCKS[0], grid.shape)
     for size, finer in zip(_BLOCKS, (*_BLOCKS[1:], 0), strict=True):
-        values = _portioned(function, grid.points(blocks + (size - 1) / 2))
+        values = portioned(function, grid.points(blocks + (size - 1) / 2))
         if size == 1:
             inside[tuple(blocks[values > 0].T)] = True
             break
@@ -86,7 +86,8 @@ def _within(blocks: Integers, size: int, finer: int, shape: tuple[int, int, int]
     return np.asarray(found[np.all(found < shape, axis=1)])
 
 
-def _portioned(function: Function, points: Floats) -> Floats:
+def portioned(function: Function, points: Floats) -> Floats:
+    """Values of a function at points, of which it is given some at once, so that memory is bounded."""
     some = [function(points[first : first + _POINTS_AT_ONCE]) for first in range(0, len(points), _POINTS_AT_ONCE)]
     return np.concatenate([np.empty(0), *some])
 
@@ -141,11 +142,11 @@ def _crossed_edges(inside: Booleans) -> tuple[Integers, Integers, Booleans]:
 def _on_edges(ends: tuple[Floats, Floats], function: Function) -> Floats:
     """Places of edges where a function is about zero, by the method of false position."""
     low, high = (end.copy() for end in ends)
-    at_low, at_high = _portioned(function, low), _portioned(function, high)
+    at_low, at_high = portioned(function, low), portioned(function, high)
     for _ in range(_SECANTS):
         part = np.clip(at_low / (at_low - at_high), 0.0, 1.0)[:, np.newaxis]
         middle = low + part * (high - low)
-        value = _portioned(function, middle)
+        value = portioned(function, middle)
         same = (value > 0) == (at_low > 0)
         low[same], at_low[same] = middle[same], value[same]
         high[~same], at_high[~same] = middle[~same], value[~same]
@@ -195,9 +196,6 @@ def _linked(within: list[bool], number: dict[tuple[int, int], int]) -> list[tupl
 def _vertices_of_edges(inside: Booleans, first: Integers, axes: Integers) -> tuple[Integers, Integers]:
     """Cubes that have vertices, shape (vertices, 3), and the four vertices round every crossed edge in turn."""
     shape = np.array(inside.shape) - 1
-    states = np.zeros(shape, dtype=np.int64)
-    for corner, (i, j, k) in enumerate(_CORNERS.tolist()):
-        states |= inside[i : i + shape[0], j : j + shape[1], k : k + shape[2]].astype(np.int64) << corner
     number = {edge: index for index, edge in enumerate(_EDGES)}
     keys = np.empty((len(first), 4), dtype=np.int64)
     for axis in range(3):
@@ -208,10 +206,18 @@ def _vertices_of_edges(inside: Booleans, first: Integers, axes: Integers) -> tup
             cube[:, u] -= back_u
             cube[:, v] -= back_v
             edge = number[back_u * (4 >> u) + back_v * (4 >> v), axis]
-            sheet = _sheets()[states[tuple(cube.T)], edge]
+            sheet = _sheets()[_states(inside, cube), edge]
             keys[some, k] = np.ravel_multi_index(tuple(cube.T), tuple(shape)) * 4 + sheet
     own, numbers = np.unique(keys, return_inverse=True)
     return np.stack(np.unravel_index(own // 4, tuple(shape)), axis=1), numbers.reshape(-1, 4)
+
+
+def _states(inside: Booleans, cubes: Integers) -> Integers:
+    """Corners of cubes that are inside, as the bits of a number; shape (cubes,)."""
+    states = np.zeros(len(cubes), dtype=np.int64)
+    for corner, ahead in enumerate(_CORNERS):
+        states |= inside[tuple((cubes + ahead).T)].astype(np.int64) << corner
+    return states
 
 
 def _best_places(

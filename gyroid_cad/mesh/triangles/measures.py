@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot, freeze_arrays
+from gyroid_cad.common.arrays import dot, freeze_arrays, numbered_groups
 from gyroid_cad.common.graph import connected
 from gyroid_cad.mesh.triangles.distances import locator_of, vtk_module
 
@@ -303,8 +303,8 @@ def _run_out(points: Floats, facets: Integers, normals: Floats, places: Floats, 
     along = ends[:, 1] - ends[:, 0]
     # Points of edges find those nearby: of long ones there must be many.
     counts = np.ceil(np.linalg.norm(along, axis=1) / (_EDGE_STEP * np.ptp(points, axis=0).max())).astype(np.int64)
-    edge = np.repeat(np.arange(len(ends)), counts)
-    part = (np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[edge]
+    edge, step = numbered_groups(counts)
+    part = (step + 0.5) / counts[edge]
     _, near = cKDTree(ends[edge, 0] + part[:, np.newaxis] * along[edge]).query(places, min(_EDGES_NEARBY, len(edge)))
     near = edge[near.reshape(len(places), -1)]
     offset = places[:, np.newaxis] - ends[near, 0]

@@ -173,7 +173,7 @@ class Geometries:
         if id(geometry) not in self._read:
             self._read[id(geometry)] = geometry, read_geometry(geometry)
         read = self._read[id(geometry)][1]
-        if matrix is None:
+        if matrix is None or geometry is None:
             return read
         if isinstance(read, Spline):
             # Of a lattice many are translates of few.
@@ -272,8 +272,8 @@ def _placed(kind: str, sizes: Callable[[Any], tuple[float, ...]]) -> Callable[[A
         frame = geometry.Position()
         # A conic's frame is always right-handed, and has no word for it.
         left_handed = hasattr(frame, "Direct") and not frame.Direct()
-        places = (_triple(part) for part in (frame.Location(), frame.Direction(), frame.XDirection()))
-        return Placed(kind, *places, sizes(geometry), left_handed)
+        origin, axis, along = (_triple(part) for part in (frame.Location(), frame.Direction(), frame.XDirection()))
+        return Placed(kind, origin, axis, along, sizes(geometry), left_handed)
 
     return read
 
@@ -322,7 +322,7 @@ def _triple(part: gp_Pnt | gp_Dir) -> Triple:
     return part.X(), part.Y(), part.Z()
 
 
-_READERS: dict[type, Callable[[Any], Any]] = {
+_READERS: dict[type, Callable[[Any], Geometry]] = {
     Geom_BSplineCurve: _spline_curve,
     Geom_BSplineSurface: _spline_surface,
     Geom_BezierCurve: lambda curve: _spline_curve(GeomConvert.CurveToBSplineCurve_s(curve)),

@@ -55,7 +55,7 @@ class StepPart:
     colour : str
         By which STEP knows it; that of the file's reader if left out.
     face_names, face_colours : sequence of str
-        One a face of its one solid, or none.
+        One a face, as the kernel counts them, or none.
     """
 
     name: str
@@ -190,7 +190,8 @@ class _Products:
 
     def _part(self, part: StepPart, name: str) -> _Product:
         product = self._product(name)
-        numbers = [solid.write(self.text, face_names=part.face_names) for solid in part.solids]
+        names = iter(part.face_names)
+        numbers = [solid.write(self.text, names) for solid in part.solids]
         product.context = self._context(max(solid.tolerance for solid in part.solids))
         items = refs([self.text.frame(*_HOME), *(solid for solid, _ in numbers)])
         product.representation = self.text.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},#{product.context})")
@@ -235,13 +236,17 @@ class _Products:
 
     def _colour(self, part: StepPart, numbers: list[tuple[int, list[int]]], context: int) -> None:
         whole = self._style(part.colour, with_lines=True)
-        styled = [self.text.add(f"STYLED_ITEM('color',(#{whole}),#{solid})") for solid, _ in numbers]
-        for face, colour in zip(numbers[0][1] if part.face_colours else (), part.face_colours, strict=True):
-            if colour != part.colour:
-                style = self._style(colour)
-                styled.append(
-                    self.text.add(f"OVER_RIDING_STYLED_ITEM('overriding color',(#{style}),#{face},#{styled[0]})")
-                )
+        colours, styled = iter(part.face_colours), []
+        for solid, faces in numbers:
+            of_solid = self.text.add(f"STYLED_ITEM('color',(#{whole}),#{solid})")
+            others = ((face, colour) for face, colour in zip(faces, colours, strict=False) if colour != part.colour)
+            styled += [
+                of_solid,
+                *self.text.add_all(
+                    f"OVER_RIDING_STYLED_ITEM('overriding color',(#{self._style(colour)}),#{face},#{of_solid})"
+                    for face, colour in others
+                ),
+            ]
         self.text.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',{refs(styled)},#{context})")
 
     def _style(self, colour: str, with_lines: bool = False) -> int:

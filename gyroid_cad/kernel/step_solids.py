@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,15 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepClass3d import BRepClass3d
 from OCP.BRepTools import BRepTools_WireExplorer
 from OCP.Geom import Geom_SphericalSurface
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
+from OCP.TopAbs import (
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_FORWARD,
+    TopAbs_REVERSED,
+    TopAbs_SHELL,
+    TopAbs_SOLID,
+    TopAbs_WIRE,
+)
 from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Vertex
@@ -53,7 +61,8 @@ class StepSolid:
     vertices : list of tuple of float
     edges : list of (first vertex, last vertex, curve)
     shells : list of list of faces
-        The outer one first.
+    outer : int
+        Which of them is not round a void.
     """
 
     tolerance: float = 0.0
@@ -62,6 +71,7 @@ class StepSolid:
     vertices: list[Triple] = field(default_factory=list)
     edges: list[tuple[int, int, int]] = field(default_factory=list)
     shells: list[list[_Face]] = field(default_factory=list)
+    outer: int = 0
 
     @property
     def extent(self) -> float:
@@ -70,15 +80,14 @@ class StepSolid:
         places = [np.array(self.vertices), *(one.poles for one in splines)]
         return max(float(np.abs(some).max()) for some in places)
 
-    def write(self, text: StepText, name: str = "", face_names: Sequence[str] = ()) -> tuple[int, list[int]]:
+    def write(self, text: StepText, face_names: Iterator[str]) -> tuple[int, list[int]]:
         """Write the solid.
 
         Parameters
         ----------
         text : StepText
-        name : str
-        face_names : sequence of str
-            One a face, or none.
+        face_names : iterator of str
+            One a face, as the kernel counts them, or none.
 
         Returns
         -------
@@ -87,14 +96,14 @@ class StepSolid:
         faces : list of int
             Numbers of its faces, as the kernel counts them.
         """
-        surfaces, curves = text.geometries(self.surfaces.found), text.geometries(self.curves.found)
+        geometries = text.geometries([*self.surfaces.found, *self.curves.found])
+        curves = geometries[len(self.surfaces.found) :]
         points = text.points(np.array(self.vertices).reshape(-1, 3), shared=False)
         vertices = text.add_all(f"VERTEX_POINT('',#{point})" for point in points)
         edges = text.add_all(
             f"EDGE_CURVE('',#{vertices[first]},#{vertices[last]},#{curves[curve]},.T.)"
             for first, last, curve in self.edges
         )
-        names = iter(face_names)
         shells, faces = [], []
         for shell in self.shells:
             numbers = []
@@ -103,14 +112,15 @@ class StepSolid:
                 surface = self.surfaces.found[face.surface]
                 # The entity's normal is the opposite of the kernel's there.
                 turned = isinstance(surface, Placed) and surface.left_handed
-                rest = f"{refs(bounds)},#{surfaces[face.surface]},{flag(face.forward != turned)}"
-                numbers.append(text.add(f"ADVANCED_FACE({quoted(next(names, ''))},{rest})"))
+                rest = f"{refs(bounds)},#{geometries[face.surface]},{flag(face.forward != turned)}"
+                numbers.append(text.add(f"ADVANCED_FACE({quoted(next(face_names, ''))},{rest})"))
             shells.append(text.add(f"CLOSED_SHELL('',{refs(numbers)})"))
             faces += numbers
-        if len(shells) == 1:
-            return text.add(f"MANIFOLD_SOLID_BREP({quoted(name)},#{shells[0]})"), faces
-        voids = text.add_all(f"ORIENTED_CLOSED_SHELL('',*,#{shell},.F.)" for shell in shells[1:])
-        return text.add(f"BREP_WITH_VOIDS({quoted(name)},#{shells[0]},{refs(voids)})"), faces
+        outer = shells.pop(self.outer)
+        if not shells:
+            return text.add(f"MANIFOLD_SOLID_BREP('',#{outer})"), faces
+        voids = text.add_all(f"ORIENTED_CLOSED_SHELL('',*,#{shell},.F.)" for shell in shells)
+        return text.add(f"BREP_WITH_VOIDS('',#{outer},{refs(voids)})"), faces
 
     def _bound(self, text: StepText, loop: _Loop, vertices: range, edges: range, forward: bool) -> int:
         if loop.vertex is not None:
@@ -158,10 +168,11 @@ class _Reading:
             raise UnknownGeometryError("a solid with more than shells")
         if len(shells) > 1:
             outer = BRepClass3d.OuterShell_s(as_solid(whole))
-            shells.sort(key=lambda shell: not shell.IsSame(outer))
+            self.read.outer = next(number for number, shell in enumerate(shells) if shell.IsSame(outer))
         for number, shell in enumerate(shells):
             # The shell of a void is written as seen from the void.
-            self.read.shells.append([self._face(as_face(face), number > 0) for face in _children(shell)])
+            turned = number != self.read.outer
+            self.read.shells.append([self._face(as_face(face), turned) for face in _children(shell)])
 
     def _face(self, face: TopoDS_Face, turned: bool) -> _Face:
         location = TopLoc_Location()
@@ -203,7 +214,7 @@ class _Reading:
 
     def _use(self, edge: TopoDS_Edge) -> Use:
         along, known = _along(edge), self._edges.Extent()
-        number = self._edges.Add(edge)
+        number = int(self._edges.Add(edge))
         if number > known:
             forward = as_edge(edge.Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
@@ -217,7 +228,7 @@ class _Reading:
         if vertex.IsNull():
             raise UnknownGeometryError("an edge without an end")
         known = self._vertices.Extent()
-        number = self._vertices.Add(vertex)
+        number = int(self._vertices.Add(vertex))
         if number > known:
             place = BRep_Tool.Pnt_s(vertex)
             self.read.vertices.append((place.X(), place.Y(), place.Z()))

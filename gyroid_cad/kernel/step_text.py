@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import TextIO
 
 import numpy as np
@@ -70,7 +71,7 @@ class StepText:
 
     def point(self, place: Triple) -> int:
         """A point that others may refer to as well."""
-        x, y, z = (real(round(part, self._decimals)) for part in place)
+        x, y, z = (real(round(part, self._decimals) + 0.0) for part in place)
         return self.once(f"CARTESIAN_POINT('',({x},{y},{z}))")
 
     def points(self, places: Floats, shared: bool) -> list[int]:
@@ -90,7 +91,7 @@ class StepText:
         return (which + numbers.start).tolist() if len(places) else []
 
     def direction(self, way: Triple) -> int:
-        x, y, z = (real(round(part, _DIRECTION_DECIMALS)) for part in way)
+        x, y, z = (real(round(part, _DIRECTION_DECIMALS) + 0.0) for part in way)
         return self.once(f"DIRECTION('',({x},{y},{z}))")
 
     def frame(self, origin: Triple, axis: Triple = (0.0, 0.0, 1.0), along: Triple = (1.0, 0.0, 0.0)) -> int:
@@ -104,7 +105,7 @@ class StepText:
         poles = [one.poles.reshape(-1, 3) for one in found if isinstance(one, Spline)]
         numbers = self.points(np.concatenate(poles), shared=True) if poles else []
         ends = np.cumsum([0, *map(len, poles)]).tolist()
-        splines = iter(zip(ends[:-1], ends[1:], strict=True))
+        splines = pairwise(ends)
         made = []
         for one in found:
             if isinstance(one, Spline):

@@ -34,24 +34,24 @@ from OCP.gp import gp_Dir, gp_Pnt
 from OCP.TopLoc import TopLoc_Location
 
 __all__ = [
-    "Frame",
+    "AxisPlacement",
     "Geometries",
     "Geometry",
     "Knots",
     "Line",
     "Placed",
     "Spline",
-    "Swept",
+    "SweptSurface",
     "Triple",
     "UnknownGeometryError",
-    "frame_of",
+    "axis_placement",
     "read_geometry",
 ]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 # Origin, axis and direction of the first axis.
-Frame = tuple[Triple, Triple, Triple]
+AxisPlacement = tuple[Triple, Triple, Triple]
 Knots = tuple[tuple[float, ...], tuple[int, ...]]
 
 
@@ -122,7 +122,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Swept:
+class SweptSurface:
     """The surface that a curve leaves as it moves along a direction, or turns about an axis.
 
     Attributes
@@ -138,7 +138,7 @@ class Swept:
     origin: Triple | None = None
 
 
-Geometry = Spline | Placed | Line | Swept
+Geometry = Spline | Placed | Line | SweptSurface
 
 
 class Geometries:
@@ -146,7 +146,7 @@ class Geometries:
 
     Attributes
     ----------
-    found : list of Spline, Placed, Line or Swept
+    found : list of Spline, Placed, Line or SweptSurface
     """
 
     def __init__(self) -> None:
@@ -156,7 +156,7 @@ class Geometries:
         self._numbers: dict[tuple[int, bytes], int] = {}
 
     def number(self, geometry: Geom_Geometry | None, location: TopLoc_Location) -> int:
-        """Where in ``found`` a curve or surface is that a location moves.
+        """Index in ``found`` of a curve or surface that a location moves.
 
         Raises
         ------
@@ -194,8 +194,8 @@ def read_geometry(geometry: Geom_Geometry | None) -> Geometry:
     return reader(geometry)
 
 
-def frame_of(location: TopLoc_Location) -> Frame:
-    """Where a location takes the origin and the axes z and x.
+def axis_placement(location: TopLoc_Location) -> AxisPlacement:
+    """Return the places to which a location takes the origin and the axes z and x.
 
     Raises
     ------
@@ -299,13 +299,13 @@ def _line(line: Geom_Line) -> Line:
     return Line(_triple(axis.Location()), _triple(axis.Direction()))
 
 
-def _extrusion(surface: Geom_SurfaceOfLinearExtrusion) -> Swept:
-    return Swept(_swept_curve(surface), _triple(surface.Direction()))
+def _extrusion(surface: Geom_SurfaceOfLinearExtrusion) -> SweptSurface:
+    return SweptSurface(_swept_curve(surface), _triple(surface.Direction()))
 
 
-def _revolution(surface: Geom_SurfaceOfRevolution) -> Swept:
+def _revolution(surface: Geom_SurfaceOfRevolution) -> SweptSurface:
     axis = surface.Axis()
-    return Swept(_swept_curve(surface), _triple(axis.Direction()), _triple(axis.Location()))
+    return SweptSurface(_swept_curve(surface), _triple(axis.Direction()), _triple(axis.Location()))
 
 
 def _swept_curve(surface: Any) -> Any:
@@ -313,7 +313,7 @@ def _swept_curve(surface: Any) -> Any:
 
 
 def _basis(geometry: Any) -> Geometry:
-    """What a trimmed curve or surface was trimmed from: edges and vertices bound it anyway."""
+    """Read what a trimmed curve or surface was trimmed from: edges and vertices bound it anyway."""
     part = geometry.BasisCurve() if isinstance(geometry, Geom_TrimmedCurve) else geometry.BasisSurface()
     return read_geometry(part)
 

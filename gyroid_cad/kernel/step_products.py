@@ -1,4 +1,4 @@
-"""What a STEP file says round its solids: header, product, units, assembly and colours."""
+"""Header, products, units, assembly and colours of a STEP file: all that is round its solids."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from OCP.TopoDS import TopoDS_Shape
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes
-from gyroid_cad.kernel.step_geometry import Frame, frame_of
+from gyroid_cad.kernel.step_geometry import AxisPlacement, axis_placement
 from gyroid_cad.kernel.step_solids import StepSolid, read_solids, require_solids
 from gyroid_cad.kernel.step_text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
 
 __all__ = ["Occurrence", "StepPart", "products_of", "time_stamp", "write_products"]
 
-_HOME: Frame = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+_HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
 _SCHEMAS: Mapping[Schema, tuple[str, str, int, str]] = {
     "ap214": (
@@ -73,12 +73,12 @@ class Occurrence:
     ----------
     part : int
     name : str
-    frame : Frame
+    frame : AxisPlacement
     """
 
     part: int
     name: str
-    frame: Frame
+    frame: AxisPlacement
 
 
 def write_products(
@@ -123,7 +123,7 @@ def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Oc
         return [StepPart(name, read_solids(shape))], []
     require_solids(shape)
     parts = [StepPart(f"{name} {kind}", read_solids(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
-    places = [frame_of(solid.Location()) for solid in solids]
+    places = [axis_placement(solid.Location()) for solid in solids]
     return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
 
 

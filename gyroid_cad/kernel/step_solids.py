@@ -208,7 +208,7 @@ class _Reading:
         return _Loop(ordered)
 
     def _joined(self, uses: list[Use]) -> bool:
-        """Whether every edge ends where the next begins."""
+        """Tell whether every edge ends where the next begins."""
         ends = [self.read.edges[edge][:2] if along else self.read.edges[edge][1::-1] for edge, along in uses]
         return all(end == start for (_, end), (start, _) in zip(ends, [*ends[1:], ends[0]], strict=True))
 

@@ -11,7 +11,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.kernel.step_geometry import Geometry, Knots, Line, Placed, Spline, Swept, Triple
+from gyroid_cad.kernel.step_geometry import Geometry, Knots, Line, Placed, Spline, SweptSurface, Triple
 
 __all__ = ["StepText", "flag", "quoted", "real", "refs"]
 
@@ -101,7 +101,7 @@ class StepText:
 
     def geometries(self, found: Sequence[Geometry]) -> list[int]:
         """Write curves and surfaces; returns their numbers."""
-        curves = iter(self.geometries([one.curve for one in found if isinstance(one, Swept)]) if found else ())
+        curves = iter(self.geometries([one.curve for one in found if isinstance(one, SweptSurface)]) if found else ())
         poles = [one.poles.reshape(-1, 3) for one in found if isinstance(one, Spline)]
         numbers = self.points(np.concatenate(poles), shared=True) if poles else []
         ends = np.cumsum([0, *map(len, poles)]).tolist()
@@ -123,7 +123,7 @@ class StepText:
     def _vector(self, way: Triple) -> int:
         return self.once(f"VECTOR('',#{self.direction(way)},1.)")
 
-    def _swept(self, swept: Swept, curve: int) -> int:
+    def _swept(self, swept: SweptSurface, curve: int) -> int:
         if swept.origin is None:
             return self.add(f"SURFACE_OF_LINEAR_EXTRUSION('',#{curve},#{self._vector(swept.direction)})")
         axis = self.once(f"AXIS1_PLACEMENT('',#{self.point(swept.origin)},#{self.direction(swept.direction)})")

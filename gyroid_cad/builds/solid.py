@@ -162,7 +162,7 @@ class Build:
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                write_shape(self._shape, path, schema, deviation, angle, cut=self.fitted.spec.trimmed)
+                write_shape(self._shape, path, schema, deviation, angle)
 
     def _require_memory(self, bytes_per_cell: int) -> None:
         require_memory(self.cells, bytes_per_cell, len(self.fitted.wall.weights))
@@ -180,10 +180,8 @@ class Build:
             )
 
 
-def write_shape(
-    shape: KernelShape, path: Path, schema: Schema, deviation: float, angle: float, cut: bool = False
-) -> None:
-    """Write a shape, whose faces may have been cut, in the format of the path's ending.
+def write_shape(shape: KernelShape, path: Path, schema: Schema, deviation: float, angle: float) -> None:
+    """Write a shape in the format of the path's ending.
 
     Raises
     ------
@@ -192,7 +190,7 @@ def write_shape(
 
     form = format_of(path)
     if form is STEP:
-        write_step(shape, path, schema, parameter_curves=cut)
+        write_step(shape, path, schema)
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:

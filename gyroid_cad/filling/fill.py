@@ -169,7 +169,7 @@ class Filled(HostShapes):
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), path, schema, limit, angle, cut=True)
+                write_shape(self.solid(), path, schema, limit, angle)
 
 
 def fill(

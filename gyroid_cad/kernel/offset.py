@@ -46,7 +46,7 @@ Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 _TOLERANCE = 1e-5
 # The kernel's own ways are quick where they work at all; those that are not crash or do not end.
 _SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _SECONDS_BETWEEN_LOOKS = 60.0, 5.0, 0.02
-_PIECES = "pieces"
+_PIECES, _PIECES_TO_OPENINGS = "pieces", "pieces to openings"
 _SOLID, _REASON = "solid.bin", "reason.txt"
 
 
@@ -92,7 +92,9 @@ def offsets(
 
 def _awaited(process: Started, path: Path) -> Path | None:
     """The path once there is a file; None if the process ends before, or takes too long."""
-    at_most = _SECONDS_AT_MOST if path.name == _PIECES else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
+    at_most = (
+        _SECONDS_AT_MOST if path.name in (_PIECES, _PIECES_TO_OPENINGS) else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
+    )
     end = time.monotonic() + at_most
     while not path.exists():
         ended = process.wait(_SECONDS_BETWEEN_LOOKS) is not None
@@ -156,6 +158,10 @@ def _of_pieces(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float
     return compound_of(core_of_pieces(solid, skin))
 
 
+def _of_pieces_to_openings(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> TopoDS_Shape:
+    return compound_of(core_of_pieces(solid, skin, openings))
+
+
 def _less_thick_skin(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, join: GeomAbs_JoinType
 ) -> TopoDS_Shape:
@@ -182,6 +188,7 @@ OPEN_WAYS: Mapping[str, Way] = MappingProxyType(
         "thick skin, arcs": partial(_less_thick_skin, join=GeomAbs_Arc),
         "thick skin, sharp": partial(_less_thick_skin, join=GeomAbs_Intersection),
         "all faces but openings": _offset_but_openings,
+        _PIECES_TO_OPENINGS: _of_pieces_to_openings,
     }
 )
 CLOSED_WAYS: Mapping[str, Way] = MappingProxyType(
@@ -247,8 +254,10 @@ def _attempts(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, reasons: list[str]
 ) -> Generator[list[TopoDS_Solid]]:
     ways = list(CLOSED_WAYS)
-    if openings and sum(1 for _ in parts_of(solid, TopAbs_SHELL)) == 1:
-        ways = [*OPEN_WAYS, *ways]
+    if openings:
+        # Of solids with voids the kernel's own ways offset one shell alone.
+        voids = sum(1 for _ in parts_of(solid, TopAbs_SHELL)) > 1
+        ways = [_PIECES_TO_OPENINGS, *ways] if voids else [*OPEN_WAYS, *ways]
     with closing(offsets(solid, openings, skin, ways, reasons)) as found:
         for way, core in zip(ways, found, strict=True):
             if core is not None:

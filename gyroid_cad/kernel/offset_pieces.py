@@ -6,6 +6,9 @@ Faces that pass into each other smoothly share the offset of their common edge, 
 on either side of it: what only touches is joined here, and never sought as a crossing. At edges that point outwards
 the offsets run through each other, and end where nothing is kept.
 
+An opening is its own offset, to which the others come: round its border, as wide as the skin, runs a tube from the
+offset of the face beside it until a little beyond the opening.
+
 An offset has the parameters of its face, so that curves in the parameter plane bound both.
 """
 
@@ -59,6 +62,10 @@ _SHARED = -1
 # Of what is measured between samples, which may be more elsewhere.
 _MARGIN = 1.5
 _CLOSELY = 36
+# How far tubes go on outside an opening, in radians.
+_BEYOND = 0.35
+# By how much the offset beside an opening must come through it to need no tube, in radians.
+_THROUGH = 0.1
 
 
 @dataclass(slots=True)
@@ -73,8 +80,10 @@ class _Side:
     tangents: Floats
 
 
-def offset_pieces(solid: TopoDS_Solid, by: float) -> list[TopoDS_Face]:
-    """Faces, oriented like the solid's, among which is all of the inner side of a skin, and more.
+def offset_pieces(
+    solid: TopoDS_Solid, by: float, openings: Sequence[TopoDS_Face] = ()
+) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
+    """Faces, oriented like the solid's, among which is all of the inner side of a skin, and more; and the openings.
 
     Parameters
     ----------
@@ -82,21 +91,59 @@ def offset_pieces(solid: TopoDS_Solid, by: float) -> list[TopoDS_Face]:
         Without faces that close on themselves.
     by : float
         Thickness of the skin, in mm.
+    openings : sequence of TopoDS_Face
+        Of its faces.
 
     Raises
     ------
     KernelError
         If an offset cannot be fitted.
     """
-    return _Pieces(solid, by).made()
+    return _Pieces(solid, by, openings).made()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rim:
+    """Where the tube round an opening's border ends, as the offset of a face beside it would: a little outside.
+
+    Its parameters are those of the edge, and zero.
+    """
+
+    opening: FaceOffset
+    side: _Side
+    sign: float
+    by: float
+    surface: None = None
+
+    def axes(self, along: Floats) -> tuple[Floats, Floats]:
+        """Unit vectors out of the opening, and along it away from its border; shape (n, 3) each."""
+        up = self.opening.normals(plane_points(self.side.curve, along))
+        return up, np.cross(up, self.sign * self.opening.tangents(self.side.curve, along))
+
+    def normals(self, places: Floats) -> Floats:
+        """Away from where the tube ends, as from a face inwards; shape (n, 3)."""
+        up, into = self.axes(places[:, 0])
+        return np.asarray(-np.cos(_BEYOND) * into - np.sin(_BEYOND) * up)
+
+    def points(self, places: Floats) -> Floats:
+        """Ends of the tube, shape (n, 3)."""
+        on_edge = self.opening.points(plane_points(self.side.curve, places[:, 0]))
+        return np.asarray(on_edge - self.by * self.normals(places))
+
+    def on_surface(self, places: Floats) -> Floats:
+        return self.points(places)
 
 
 class _Pieces:
-    def __init__(self, solid: TopoDS_Solid, by: float) -> None:
+    def __init__(self, solid: TopoDS_Solid, by: float, openings: Sequence[TopoDS_Face]) -> None:
         self.by, self.tolerance = by, _TOLERANCE * by
         self.builder, self.place = BRep_Builder(), TopLoc_Location()
         self.faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
-        self.offsets = [FaceOffset(face, by, self.tolerance) for face in self.faces]
+        self.opened = [any(face.IsSame(opening) for opening in openings) for face in self.faces]
+        self.offsets: list[FaceOffset | _Rim] = [
+            FaceOffset(face, 0.0 if is_open else by, self.tolerance)
+            for face, is_open in zip(self.faces, self.opened, strict=True)
+        ]
         self.edges, self.vertices = NumberedShapes(), NumberedShapes()
         TopExp.MapShapes_s(solid, TopAbs_EDGE, self.edges)
         TopExp.MapShapes_s(solid, TopAbs_VERTEX, self.vertices)
@@ -105,6 +152,9 @@ class _Pieces:
             for shape in parts_of(face.Oriented(TopAbs_FORWARD), TopAbs_EDGE):
                 self.sides.setdefault(self.edges.FindIndex(shape), []).append(self._side(index, as_edge(shape)))
         self.bends = {number: _bend(*sides) for number, sides in self.sides.items() if len(sides) == 2}
+        self.rims: dict[int, list[_Side]] = {}
+        for number in list(self.bends):
+            self._open(number)
         self.ends: dict[int, tuple[int, int]] = {}
         for number in self.sides:
             edge = as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD))
@@ -117,11 +167,40 @@ class _Pieces:
         self.made_edges: dict[tuple[int, int], TopoDS_Edge] = {}
         self.arcs: dict[tuple[int, frozenset[int]], _Arc] = {}
 
-    def made(self) -> list[TopoDS_Face]:
-        faces = [self._offset_face(index) for index in range(len(self.faces)) if self.offsets[index].surface]
+    def made(self) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
+        faces = {index: self._offset_face(index) for index in range(len(self.faces)) if self.offsets[index].surface}
         tubes = [self._tube(number) for number, bend in self.bends.items() if bend.min() < -_SMOOTH]
+        tubes += [self._tube(number) for number in self.rims]
         balls = [ball for vertex in range(1, self.vertices.Extent() + 1) for ball in self._balls(vertex)]
-        return [*faces, *tubes, *balls]
+        kept, opened = ([face for index, face in faces.items() if self.opened[index] == side] for side in (False, True))
+        return [*kept, *tubes, *balls], opened
+
+    def _open(self, number: int) -> None:
+        """Have an edge of openings for what it is: between two of them there is none, else a rim goes along it."""
+        sides = self.sides[number]
+        opened = [side for side in sides if self.opened[side.face]]
+        if len(opened) == 2:
+            self.bends[number] = np.zeros(_SAMPLES)
+        if len(opened) != 1:
+            return
+        del self.bends[number]
+        (side,), (beside,) = opened, [side for side in sides if not self.opened[side.face]]
+        offset = self.offsets[side.face]
+        assert isinstance(offset, FaceOffset)
+        rim = _Rim(offset, side, _sign(offset, side.edge), self.by)
+        line = Geom2d_Line(gp_Pnt2d(0.0, 0.0), gp_Dir2d(1.0, 0.0))
+        normals = rim.normals(plane_points(line, side.parameters))
+        end = _Side(len(self.offsets), side.edge, line, side.parameters, normals, side.tangents)
+        self.offsets.append(rim)
+        sides.append(end)
+        # Where the offset of the face beside it comes through the opening by itself, no tube goes on from it.
+        up, into = rim.axes(side.parameters)
+        if np.min(np.arctan2(np.sum(beside.normals * up, axis=1), -np.sum(beside.normals * into, axis=1))) > -_THROUGH:
+            self.rims[number] = [beside, end]
+
+    def _pair(self, number: int) -> list[_Side]:
+        """What a tube round an edge runs between."""
+        return self.rims.get(number) or self.sides[number]
 
     def _side(self, index: int, edge: TopoDS_Edge) -> _Side:
         face = self.faces[index]
@@ -130,8 +209,9 @@ class _Pieces:
         parameters = np.linspace(first, last, _SAMPLES)
         places = plane_points(curve, parameters)
         offset = self.offsets[index]
-        sign = offset.outwards * (-1.0 if edge.Orientation() == TopAbs_REVERSED else 1.0)
-        return _Side(index, edge, curve, parameters, offset.normals(places), sign * offset.tangents(curve, parameters))
+        assert isinstance(offset, FaceOffset)
+        tangents = _sign(offset, edge) * offset.tangents(curve, parameters)
+        return _Side(index, edge, curve, parameters, offset.normals(places), tangents)
 
     def _smooth(self, number: int) -> bool:
         bend = self.bends.get(number)
@@ -243,7 +323,7 @@ class _Pieces:
         return as_face(made.Oriented(self.faces[index].Orientation()))
 
     def _tube(self, number: int) -> TopoDS_Face:
-        sides = self.sides[number]
+        sides = self._pair(number)
         first, last = sides[0].parameters[[0, -1]].tolist()
         curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
         ways = [partial(self._inwards, side) for side in sides]
@@ -296,7 +376,7 @@ class _Pieces:
 
         Tubes that go on in each other share it.
         """
-        sides, vertex = self.sides[number], self.ends[number][at]
+        sides, vertex = self._pair(number), self.ends[number][at]
         corners = [self.corners[vertex, side.face] for side in sides]
         key = (vertex, frozenset(corners))
         if key not in self.arcs:
@@ -392,6 +472,11 @@ def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_
     return fitted_plane_curve(
         lambda parameters: start + np.outer((parameters - first) / (last - first), way), [first, last], _SAME
     )
+
+
+def _sign(offset: FaceOffset, edge: TopoDS_Edge) -> float:
+    """1 if an edge's curve runs round a face anticlockwise, seen from outside, else -1."""
+    return offset.outwards * (-1.0 if edge.Orientation() == TopAbs_REVERSED else 1.0)
 
 
 def _bend(one: _Side, other: _Side) -> Floats:

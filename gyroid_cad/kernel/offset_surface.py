@@ -65,7 +65,7 @@ class FaceOffset:
     face : TopoDS_Face
         Oriented out of its solid.
     by : float
-        In mm.
+        In mm; 0 of an opening, whose offset is the face itself.
     tolerance : float
         Of a fit, in mm.
 
@@ -91,7 +91,9 @@ class FaceOffset:
         self.by = by
         self.bounds = np.array(BRepTools.UVBounds_s(face)).reshape(2, 2)
         self.surface: Geom_Surface | None = None
-        if not self.bent_away():
+        if by == 0:
+            self.surface = self.base
+        elif not self.bent_away():
             self.surface = self._closed_form() or self._fitted(tolerance)
 
     def _derivatives(self, places: Floats) -> tuple[Floats, Floats, Floats]:

@@ -207,7 +207,9 @@ class Inside:
         distances = self._distances(points)
         inside = distances < 0
         for index in np.flatnonzero(np.abs(distances) < self._band).tolist():
-            inside[index] = _state(self._classifier, points[index]) == TopAbs_IN
+            # It takes some places for ones on the boundary that are not: these the triangles tell.
+            if (state := _state(self._classifier, points[index])) in (TopAbs_IN, TopAbs_OUT):
+                inside[index] = state == TopAbs_IN
         return np.asarray(inside)
 
 

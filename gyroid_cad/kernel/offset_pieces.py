@@ -22,28 +22,27 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.Geom import Geom_Circle, Geom_Line, Geom_SphericalSurface
+from OCP.Geom import Geom_Circle, Geom_Line
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
-from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Ax2, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
-from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.graph import connected
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex
 from gyroid_cad.kernel.offset_surface import (
     FaceOffset,
-    between,
+    Rim,
     closed_form_curve,
     curve_points,
     derivatives,
     plane_points,
-    tube_round,
     vector_of,
 )
+from gyroid_cad.kernel.offset_tube import BallArc, ball_round, tube_round
 from gyroid_cad.kernel.spline_fit import fitted_curve, fitted_plane_curve
 
 __all__ = ["offset_pieces"]
@@ -62,8 +61,6 @@ _SHARED = -1
 # Of what is measured between samples, which may be more elsewhere.
 _MARGIN = 1.5
 _CLOSELY = 36
-# How far tubes go on outside an opening, in radians.
-_BEYOND = 0.35
 # By how much the offset beside an opening must come through it to need no tube, in radians.
 _THROUGH = 0.1
 
@@ -102,45 +99,13 @@ def offset_pieces(
     return _Pieces(solid, by, openings).made()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Rim:
-    """Where the tube round an opening's border ends, as the offset of a face beside it would: a little outside.
-
-    Its parameters are those of the edge, and zero.
-    """
-
-    opening: FaceOffset
-    side: _Side
-    sign: float
-    by: float
-    surface: None = None
-
-    def axes(self, along: Floats) -> tuple[Floats, Floats]:
-        """Unit vectors out of the opening, and along it away from its border; shape (n, 3) each."""
-        up = self.opening.normals(plane_points(self.side.curve, along))
-        return up, np.cross(up, self.sign * self.opening.tangents(self.side.curve, along))
-
-    def normals(self, places: Floats) -> Floats:
-        """Away from where the tube ends, as from a face inwards; shape (n, 3)."""
-        up, into = self.axes(places[:, 0])
-        return np.asarray(-np.cos(_BEYOND) * into - np.sin(_BEYOND) * up)
-
-    def points(self, places: Floats) -> Floats:
-        """Ends of the tube, shape (n, 3)."""
-        on_edge = self.opening.points(plane_points(self.side.curve, places[:, 0]))
-        return np.asarray(on_edge - self.by * self.normals(places))
-
-    def on_surface(self, places: Floats) -> Floats:
-        return self.points(places)
-
-
 class _Pieces:
     def __init__(self, solid: TopoDS_Solid, by: float, openings: Sequence[TopoDS_Face]) -> None:
         self.by, self.tolerance = by, _TOLERANCE * by
         self.builder, self.place = BRep_Builder(), TopLoc_Location()
         self.faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
         self.opened = [any(face.IsSame(opening) for opening in openings) for face in self.faces]
-        self.offsets: list[FaceOffset | _Rim] = [
+        self.offsets: list[FaceOffset | Rim] = [
             FaceOffset(face, 0.0 if is_open else by, self.tolerance)
             for face, is_open in zip(self.faces, self.opened, strict=True)
         ]
@@ -165,7 +130,7 @@ class _Pieces:
         self.places, self.corners = self._corners()
         self.made_vertices: dict[int, TopoDS_Vertex] = {}
         self.made_edges: dict[tuple[int, int], TopoDS_Edge] = {}
-        self.arcs: dict[tuple[int, frozenset[int]], _Arc] = {}
+        self.arcs: dict[tuple[int, frozenset[int]], BallArc] = {}
 
     def made(self) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
         faces = {index: self._offset_face(index) for index in range(len(self.faces)) if self.offsets[index].surface}
@@ -187,7 +152,7 @@ class _Pieces:
         (side,), (beside,) = opened, [side for side in sides if not self.opened[side.face]]
         offset = self.offsets[side.face]
         assert isinstance(offset, FaceOffset)
-        rim = _Rim(offset, side, _sign(offset, side.edge), self.by)
+        rim = Rim(offset, side.curve, _sign(offset, side.edge), self.by)
         line = Geom2d_Line(gp_Pnt2d(0.0, 0.0), gp_Dir2d(1.0, 0.0))
         normals = rim.normals(plane_points(line, side.parameters))
         end = _Side(len(self.offsets), side.edge, line, side.parameters, normals, side.tangents)
@@ -199,7 +164,7 @@ class _Pieces:
             self.rims[number] = [beside, end]
 
     def _pair(self, number: int) -> list[_Side]:
-        """What a tube round an edge runs between."""
+        """Sides that a tube round an edge runs between."""
         return self.rims.get(number) or self.sides[number]
 
     def _side(self, index: int, edge: TopoDS_Edge) -> _Side:
@@ -371,7 +336,7 @@ class _Pieces:
     def _inwards(self, side: _Side, parameters: Floats) -> Floats:
         return -self.offsets[side.face].normals(plane_points(side.curve, parameters))
 
-    def _arc(self, number: int, at: int, parameter: float) -> tuple[_Arc, bool]:
+    def _arc(self, number: int, at: int, parameter: float) -> tuple[BallArc, bool]:
         """The arc that ends the tube round an edge, and whether it runs from the second side to the first.
 
         Tubes that go on in each other share it.
@@ -392,7 +357,7 @@ class _Pieces:
                 axes = gp_Ax2(place, gp_Dir(*np.cross(start, stop).tolist()), gp_Dir(*start.tolist()))
                 self.builder.MakeEdge(edge, Geom_Circle(axes, self.by), _MARGIN * self.tolerance)
             self._bound(edge, [self._vertex(corner) for corner in corners], 0.0, angle, _MARGIN * self.tolerance)
-            self.arcs[key] = _Arc(edge, (corners[0], corners[1]), vector_of(place), start, stop, angle)
+            self.arcs[key] = BallArc(edge, (corners[0], corners[1]), vector_of(place), start, stop, angle)
         arc = self.arcs[key]
         arc.uses += 1
         return arc, arc.corners[0] != corners[0]
@@ -411,56 +376,7 @@ class _Pieces:
                 arcs.remove(following[0])
                 loop.append(following[0])
                 end = next(corner for corner in following[0].corners if corner != end)
-            yield self._ball(loop)
-
-    def _ball(self, loop: list[_Arc]) -> TopoDS_Face:
-        centre = loop[0].centre
-        towards = unit(np.sum([unit(arc.start + arc.stop) for arc in loop], axis=0))
-        side = unit(np.cross(towards, np.eye(3)[np.argmin(np.abs(towards))]))
-        # Seam and poles lie as far away as they can.
-        axes = gp_Ax3(gp_Pnt(*centre.tolist()), gp_Dir(*side.tolist()), gp_Dir(*(-towards).tolist()))
-        surface = Geom_SphericalSurface(axes, self.by)
-        third = np.cross(side, -towards)
-        made, wire = TopoDS_Face(), TopoDS_Wire()
-        self.builder.MakeFace(made, surface, self.place, _LEAST_TOLERANCE)
-        self.builder.MakeWire(wire)
-        turned, end = [], loop[0].corners[0]
-        corners = []
-        for arc in loop:
-            forwards = arc.corners[0] == end
-            end = arc.corners[1] if forwards else arc.corners[0]
-
-            def places(parameters: Floats, arc: _Arc = arc) -> Floats:
-                ways = between(arc.start[np.newaxis], arc.stop[np.newaxis], parameters / arc.angle)[:, 0]
-                u = np.arctan2(ways @ third, ways @ -towards) % (2 * np.pi)
-                return np.stack([u, np.arcsin(np.clip(ways @ side, -1, 1))], axis=1)
-
-            line = fitted_plane_curve(places, [0.0, arc.angle], self.tolerance / self.by)
-            self.builder.UpdateEdge(arc.edge, line, surface, self.place, 3 * self.tolerance)
-            turned.append(arc.edge.Oriented(TopAbs_FORWARD if forwards else TopAbs_REVERSED))
-            shown = places(np.linspace(0, arc.angle, _SAMPLES))
-            corners += list(shown if forwards else shown[::-1])[:-1]
-        x, y = np.array(corners).T
-        anticlockwise = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) > 0
-        for edge in turned if anticlockwise else [edge.Reversed() for edge in reversed(turned)]:
-            self.builder.Add(wire, edge)
-        wire.Closed(True)
-        self.builder.Add(made, wire)
-        # A ball's own normal runs away from its centre, where the core's runs towards it.
-        return as_face(made.Oriented(TopAbs_REVERSED))
-
-
-@dataclass(slots=True)
-class _Arc:
-    """An edge on the ball round a corner, between what two faces' offsets make of the corner."""
-
-    edge: TopoDS_Edge
-    corners: tuple[int, int]
-    centre: Floats
-    start: Floats
-    stop: Floats
-    angle: float
-    uses: int = 0
+            yield ball_round(loop, self.by, self.tolerance)
 
 
 def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_Curve:

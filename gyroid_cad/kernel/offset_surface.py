@@ -14,16 +14,14 @@ from OCP.Geom import (
     Geom_BSplineSurface,
     Geom_Circle,
     Geom_Curve,
-    Geom_CylindricalSurface,
     Geom_Line,
     Geom_OffsetSurface,
     Geom_RectangularTrimmedSurface,
     Geom_Surface,
-    Geom_ToroidalSurface,
 )
 from OCP.Geom2d import Geom2d_Curve
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
@@ -34,13 +32,11 @@ from gyroid_cad.nurbs.surface import NurbsSurface
 
 __all__ = [
     "FaceOffset",
-    "Tube",
-    "between",
+    "Rim",
     "closed_form_curve",
     "curve_points",
     "derivatives",
     "plane_points",
-    "tube_round",
     "vector_of",
 ]
 
@@ -54,7 +50,8 @@ _POLE, _BESIDE = 1e-7, 1e-6
 # By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
 _LEAST_STRETCH = 1e-4
 _SAMPLES, _STEP = 9, 1e-5
-_ACROSS = (0.0, 0.5, 1.0)
+# How far tubes go on outside an opening, in radians.
+_BEYOND = 0.35
 
 
 class FaceOffset:
@@ -173,6 +170,49 @@ class FaceOffset:
         return np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Rim:
+    """End of the tube round an opening's border, a little outside, as the offset of a face beside it would be.
+
+    Its parameters are those of the edge, and zero.
+
+    Attributes
+    ----------
+    opening : FaceOffset
+        By nothing.
+    curve : Geom2d_Curve
+        Of the edge in its parameters.
+    sign : float
+        1 if the curve runs round the opening anticlockwise, seen from outside, else -1.
+    by : float
+        Radius of the tube, in mm.
+    """
+
+    opening: FaceOffset
+    curve: Geom2d_Curve
+    sign: float
+    by: float
+    surface: None = None
+
+    def axes(self, along: Floats) -> tuple[Floats, Floats]:
+        """Unit vectors out of the opening, and along it away from its border; shape (n, 3) each."""
+        up = self.opening.normals(plane_points(self.curve, along))
+        return up, np.cross(up, self.sign * self.opening.tangents(self.curve, along))
+
+    def normals(self, places: Floats) -> Floats:
+        """Away from where the tube ends, as from a face inwards; shape (n, 3)."""
+        up, into = self.axes(places[:, 0])
+        return np.asarray(-np.cos(_BEYOND) * into - np.sin(_BEYOND) * up)
+
+    def points(self, places: Floats) -> Floats:
+        """Ends of the tube, shape (n, 3)."""
+        on_edge = self.opening.points(plane_points(self.curve, places[:, 0]))
+        return np.asarray(on_edge - self.by * self.normals(places))
+
+    def on_surface(self, places: Floats) -> Floats:
+        return self.points(places)
+
+
 def _net(surface: Geom_Surface) -> NurbsSurface | None:
     """Arrays of a B-spline surface that has ends along both sides."""
     if not isinstance(surface, Geom_BSplineSurface) or surface.IsUPeriodic() or surface.IsVPeriodic():
@@ -249,94 +289,6 @@ def closed_form_curve(
     return curve if off < _SAME * max(1.0, float(np.abs(points).max())) else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tube:
-    """A tube's surface, and where on it the tube is.
-
-    Attributes
-    ----------
-    surface : Geom_Surface
-    place : callable
-        Parameters of the surface, shape (2,), for how far across the tube, from 0 to 1, and a parameter along it.
-    """
-
-    surface: Geom_Surface
-    place: Callable[[float, float], Floats]
-
-
-def tube_round(
-    curve: BRepAdaptor_Curve,
-    start_at: Callable[[Floats], Floats],
-    stop_at: Callable[[Floats], Floats],
-    by: float,
-    tolerance: float,
-) -> Tube:
-    """A tube round a curve: a cylinder round a line, a torus round a circle, else a fitted spline.
-
-    Parameters
-    ----------
-    curve : BRepAdaptor_Curve
-    start_at, stop_at : callable
-        Directions from the curve to the tube's borders at parameters of the curve, shape (n, 3).
-    by, tolerance : float
-        The tube's radius, and that of a fit, in mm.
-
-    Raises
-    ------
-    KernelError
-        If no spline comes near enough.
-    """
-    first, last = curve.FirstParameter(), curve.LastParameter()
-    parameters = np.linspace(first, last, _SAMPLES)
-
-    def points(across: Floats, along: Floats) -> Floats:
-        return curve_points(curve, along) + by * between(start_at(along), stop_at(along), across)
-
-    expected = points(np.array(_ACROSS), parameters)
-    start, stop = start_at(parameters[:1])[0], stop_at(parameters[:1])[0]
-    for tube in (_cylinder(curve, start, stop, by), _torus(curve, start, stop, by)):
-        if tube is not None:
-            places = np.array([tube.place(across, along) for across in _ACROSS for along in parameters.tolist()])
-            off = np.abs(derivatives(tube.surface, places)[0] - expected.reshape(-1, 3)).max()
-            if off < _SAME * max(1.0, float(np.abs(expected).max())):
-                return tube
-    surface = fitted_surface(points, [0.0, 1.0], [first, last], tolerance)
-    return Tube(surface, lambda across, along: np.array([across, along]))
-
-
-def _cylinder(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
-    if curve.GetType() != GeomAbs_Line:
-        return None
-    line = curve.Line()
-    angle = float(np.arctan2(vector_of(line.Direction()) @ np.cross(start, stop), start @ stop))
-    axes = gp_Ax3(line.Location(), line.Direction(), gp_Dir(*start.tolist()))
-    return Tube(Geom_CylindricalSurface(axes, by), lambda across, along: np.array([across * angle, along]))
-
-
-def _torus(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
-    if curve.GetType() != GeomAbs_Circle or curve.Circle().Radius() <= (1 + _SAME) * by:
-        return None
-    circle = curve.Circle()
-    axis = vector_of(circle.Axis().Direction())
-    radial = unit(curve_points(curve, np.array([curve.FirstParameter()]))[0] - vector_of(circle.Location()))
-    angles = [float(np.arctan2(way @ axis, way @ radial)) for way in (start, stop)]
-    angle = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
-    axes = gp_Ax3(circle.Location(), circle.Axis().Direction(), circle.XAxis().Direction())
-    surface = Geom_ToroidalSurface(axes, circle.Radius(), by)
-    return Tube(surface, lambda across, along: np.array([along, angles[0] + across * angle]))
-
-
 def vector_of(given: gp_Pnt | gp_Dir) -> Floats:
     """Coordinates of a point or a direction, shape (3,)."""
     return np.array([given.X(), given.Y(), given.Z()])
-
-
-def between(one: Floats, other: Floats, across: Floats) -> Floats:
-    """Unit vectors on great circles from some to others, each shape (n, 3), so far across; shape (k, n, 3)."""
-    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
-    sines = np.sin(angles)
-    flat = sines < _SAME
-    safe = np.where(flat, 1.0, sines)
-    a = np.where(flat, 1 - across[:, np.newaxis], np.sin((1 - across)[:, np.newaxis] * angles) / safe)
-    b = np.where(flat, across[:, np.newaxis], np.sin(across[:, np.newaxis] * angles) / safe)
-    return np.asarray(a[..., np.newaxis] * one + b[..., np.newaxis] * other)

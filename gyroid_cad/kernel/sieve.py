@@ -33,6 +33,8 @@ _OFF = 1e-3
 _MOST = 0.5
 # Of the thickness of a skin, within which places are one: more where two tubes that meet touch before they cross.
 _FUZZY = (0.0, 1e-3)
+# Of the thickness of a skin, by which it is thinner or thicker where offsets touch without crossing else.
+_NEARLY = (0.0, -5e-4, 5e-4)
 
 
 def core_of_pieces(solid: TopoDS_Solid, skin: float, openings: Sequence[TopoDS_Face] = ()) -> list[TopoDS_Solid]:
@@ -52,8 +54,19 @@ def core_of_pieces(solid: TopoDS_Solid, skin: float, openings: Sequence[TopoDS_F
         If what is kept does not close: it says where.
     """
     faces = [face for face in parts_of(solid, TopAbs_FACE) if not any(face.IsSame(opening) for opening in openings)]
-    places = _Places(NearDistances(faces, skin), skin, Inside(solid) if openings else None)
-    kept, opened = offset_pieces(solid, skin, openings)
+    depths, inside = NearDistances(faces, skin), Inside(solid) if openings else None
+    problem: KernelError | None = None
+    for part in _NEARLY:
+        try:
+            return _core_of_pieces(solid, _Places(depths, (1 + part) * skin, inside), openings)
+        except KernelError as failed:
+            problem = problem or failed
+    assert problem is not None
+    raise problem
+
+
+def _core_of_pieces(solid: TopoDS_Solid, places: _Places, openings: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
+    kept, opened = offset_pieces(solid, places.skin, openings)
     pieces: list[TopoDS_Face] = []
     deep: list[bool] = []
     for piece in kept:

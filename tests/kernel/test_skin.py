@@ -184,7 +184,8 @@ PLATE = rounded(18, 14, 2) - np.pi * 3.5**2
         (plate(), [], 4 * PLATE, 1),
         (plate(), [">Z"], 5 * PLATE, 1),
         (plate(), [">Z", "<Z"], 6 * PLATE, 1),
-        (plate(), [">X"], 4 * PLATE + (10 - 2) * (6 - 2), 1),
+        # Where the opening passes into round corners the skin keeps its thickness from these: a quarter of a tube.
+        (plate(), [">X"], 4 * PLATE + (10 - np.pi / 2) * (6 - 2), 1),
         (box(), [">Z", ">X"], 8 * 6 * 6, 1),
         (bd.Cylinder(6, 14), ["mantle"], 36 * np.pi * 12, 1),
         (bd.Torus(10, 4), [], 2 * np.pi**2 * 10 * 9, 1),

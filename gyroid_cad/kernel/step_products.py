@@ -17,7 +17,7 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import AxisPlacement, axis_placement
-from gyroid_cad.kernel.step_solids import StepSolid, read_solids, require_solids
+from gyroid_cad.kernel.step_solids import LEAST_GAP, StepSolid, read_solids, require_solids
 from gyroid_cad.kernel.step_text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
 
@@ -39,8 +39,6 @@ _SCHEMAS: Mapping[Schema, tuple[str, str, int, str]] = {
         "Managed model based 3d engineering",
     ),
 }
-# The kernel's smallest distance, which no tolerance is below.
-_LEAST_UNCERTAINTY = 1e-7
 _LINES = 0.1
 
 
@@ -169,8 +167,7 @@ class _Products:
             return
         assembly = self._product(name)
         places = [self.text.frame(*one.frame) for one in occurrences]
-        tolerance = max(solid.tolerance for part in parts for solid in part.solids)
-        assembly.context = self._context(tolerance)
+        assembly.context = self._context(max(solid.gap for part in parts for solid in part.solids))
         items = refs(dict.fromkeys([self.text.frame(*_HOME), *places]))
         assembly.representation = self.text.add(f"SHAPE_REPRESENTATION('',{items},#{assembly.context})")
         self._define(assembly)
@@ -192,7 +189,7 @@ class _Products:
         product = self._product(name)
         names = iter(part.face_names)
         numbers = [solid.write(self.text, names) for solid in part.solids]
-        product.context = self._context(max(solid.tolerance for solid in part.solids))
+        product.context = self._context(max(solid.gap for solid in part.solids))
         items = refs([self.text.frame(*_HOME), *(solid for solid, _ in numbers)])
         product.representation = self.text.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},#{product.context})")
         self._define(product)
@@ -203,13 +200,13 @@ class _Products:
     def _define(self, product: _Product) -> None:
         self.text.add(f"SHAPE_DEFINITION_REPRESENTATION(#{product.shape},#{product.representation})")
 
-    def _context(self, tolerance: float) -> int:
+    def _context(self, gap: float) -> int:
         """Units, and how far apart may be what belongs together."""
         once = self.text.once
         length = once("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
         angle = once("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
         solid_angle = once("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
-        distance = real(_rounded_up(max(tolerance, _LEAST_UNCERTAINTY)))
+        distance = real(_rounded_up(max(gap, LEAST_GAP)))
         uncertainty = once(
             f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({distance}),#{length},"
             "'distance_accuracy_value','confusion accuracy')"

@@ -249,10 +249,14 @@ def _told_apart(work: _Work, others: Integers) -> _Work:
         shared = shared[3 * len(others) :]
         one, other = shared_sides(work.triangles)
         a, b = work.triangles.ravel()[one], np.roll(work.triangles, -1, axis=1).ravel()[one]
-        wrong = shared[one] | shared[other] | ((work.vertices[a] == work.vertices[b]) & (_length(work, a, b) > 0))
+        looped = work.vertices[a] == work.vertices[b]
+        some = np.flatnonzero(shared[one] | shared[other] | looped)
+        length = _length(work, a[some], b[some])
+        wrong = ~looped[some] | (length > 0)
         if not wrong.any():
             break
-        work = _with_middles(work, one[wrong], other[wrong], _length(work, a, b)[wrong])
+        some = some[wrong]
+        work = _with_middles(work, one[some], other[some], length[wrong])
     return work
 
 

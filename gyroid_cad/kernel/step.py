@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -30,7 +30,7 @@ from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import UnknownGeometryError
-from gyroid_cad.kernel.step_products import Occurrence, StepPart, products_of, time_stamp, write_products
+from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart, products_of, time_stamp, write_products
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -106,7 +106,11 @@ _OF_LENGTHS: Mapping[str, str | int] = MappingProxyType({"xstep.cascade.unit": "
 
 
 def write_step(
-    shape: TopoDS_Shape, path: str | os.PathLike[str], schema: Schema = "ap214", name: str | None = None
+    shape: TopoDS_Shape,
+    path: str | os.PathLike[str],
+    schema: Schema = "ap214",
+    name: str | None = None,
+    size: ShapeSize | None = None,
 ) -> None:
     """Write a shape in millimetres.
 
@@ -123,6 +127,8 @@ def write_step(
     schema : {"ap214", "ap242"}
     name : str, optional
         Of the product; the file's stem if left out.
+    size : ShapeSize, optional
+        For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
 
     Raises
     ------
@@ -134,7 +140,7 @@ def write_step(
     except UnknownGeometryError:
         _write_by_kernel(shape, path, kernel_schema, product)
     else:
-        write_parts(shape, path, schema, product, parts, places)
+        write_parts(shape, path, schema, product, parts, places, size)
 
 
 def write_parts(
@@ -143,7 +149,8 @@ def write_parts(
     schema: Schema,
     product: str,
     parts: Sequence[StepPart],
-    places: Iterable[Occurrence] = (),
+    places: Sequence[Occurrence] = (),
+    size: ShapeSize | None = None,
 ) -> None:
     """Write parts that were read from a shape, and look whether the file holds it all.
 
@@ -156,15 +163,17 @@ def write_parts(
     product : str
         Name of the whole.
     parts : sequence of StepPart
-    places : iterable of Occurrence
+    places : sequence of Occurrence
         None, if there is one part.
+    size : ShapeSize, optional
+        Of all of it.
 
     Raises
     ------
     ExportError
     """
     with replacing(path) as temporary:
-        write_products(temporary, product, parts, places, schema)
+        write_products(temporary, product, parts, places, schema, size)
         _require_whole(path, temporary, shape)
 
 

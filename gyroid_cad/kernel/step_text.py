@@ -18,9 +18,9 @@ __all__ = ["StepText", "flag", "quoted", "real", "refs"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Coordinates are written to so many places after the point, in mm: half a unit of the last is 5e-10 mm, a two hundredth
-# of the kernel's smallest distance, wherever the part stands.
-_DECIMALS = 9
+# Coordinates are written to so many places after the point, in mm: half a unit of the last is 5e-11 mm, less than a
+# thousandth of the kernel's smallest distance, wherever the part stands.
+_DECIMALS = 10
 # Of parts below a millimetre, more: they keep as many digits.
 _MOST_DECIMALS = 15
 # Directions are rounding noise about 0 below this.

@@ -223,15 +223,20 @@ class _Reading:
     def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:
         along, known = _along(edge), self._edges.Extent()
         number = int(self._edges.Add(edge))
-        self._meetings.append((BRep_Tool.Tolerance_s(edge), edge, face))
+        self._meet(BRep_Tool.Tolerance_s(edge), edge, face)
         if number > known:
             forward = as_edge(edge.Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
             curve = self.read.curves.number(BRep_Tool.Curve_s(forward, location, 0.0, 0.0), location)
             ends = TopExp.FirstVertex_s(forward), TopExp.LastVertex_s(forward)
             self.read.edges.append((self._vertex(ends[0]), self._vertex(ends[1]), curve))
-            self._meetings += [(BRep_Tool.Tolerance_s(end), edge, end) for end in ends]
+            for end in ends:
+                self._meet(BRep_Tool.Tolerance_s(end), edge, end)
         return number - 1, along
+
+    def _meet(self, tolerance: float, edge: TopoDS_Edge, other: TopoDS_Face | TopoDS_Vertex) -> None:
+        if tolerance > LEAST_GAP:
+            self._meetings.append((tolerance, edge, other))
 
     def _vertex(self, vertex: TopoDS_Vertex) -> int:
         if vertex.IsNull():
@@ -254,7 +259,7 @@ def _largest_gap(meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_V
     """
     largest = 0.0
     for tolerance, edge, other in sorted(meetings, key=lambda meeting: -meeting[0]):
-        if tolerance <= max(largest, LEAST_GAP):
+        if tolerance <= largest:
             break
         curve = BRepAdaptor_Curve(edge)
         first, last = curve.FirstParameter(), curve.LastParameter()

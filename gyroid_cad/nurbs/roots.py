@@ -16,7 +16,8 @@ Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 _NEWTON_STEPS, _TURNING_STEPS = 40, 3
-_CONVERGED = 1e-14
+# What a step of Newton's method leaves is its square; what one by bisection leaves is as long as itself.
+_CONVERGED, _SQUARED = 1e-14, 1e-9
 _ROUNDING = 1e-13
 # A parabola that turns back between samples comes at most an eighth of its second difference nearer zero than they do.
 _HIDDEN = 1 / 4
@@ -58,16 +59,18 @@ def roots(
     low_value = np.concatenate([low_value, values[turned, before], turn_value])
     high_value = np.concatenate([high_value, turn_value, values[turned, before + 1]])
     place = low + (high - low) * low_value / (low_value - high_value)
+    left = np.arange(len(which))
     for _ in range(_NEWTON_STEPS):
-        value, rate = at(which, place)
-        early = (value > 0) == (low_value > 0)
-        low, high = np.where(early, place, low), np.where(early, high, place)
+        here = place[left]
+        value, rate = at(which[left], here)
+        early = (value > 0) == (low_value[left] > 0)
+        low[left], high[left] = np.where(early, here, low[left]), np.where(early, high[left], here)
         with np.errstate(divide="ignore", invalid="ignore"):
-            nearer = place - value / rate
-        astray = ~((nearer >= low - _CONVERGED) & (nearer <= high + _CONVERGED))
-        nearer = np.where(astray, (low + high) / 2, np.clip(nearer, low, high))
-        step, place = np.max(np.abs(nearer - place), initial=0.0), nearer
-        if step < _CONVERGED:
+            nearer = here - value / rate
+        astray = ~((nearer >= low[left] - _CONVERGED) & (nearer <= high[left] + _CONVERGED))
+        place[left] = np.where(astray, (low[left] + high[left]) / 2, np.clip(nearer, low[left], high[left]))
+        left = left[np.abs(place[left] - here) >= np.where(astray, _CONVERGED, _SQUARED)]
+        if not len(left):
             break
     order = np.lexsort((place, which))
     return which[order], place[order]

@@ -168,9 +168,11 @@ def _padded(ends: Ends, starts: Integers, stops: Integers) -> Integers:
     return np.where(which < count[:, None], order[index], -1)
 
 
-def _onward(pairs: Pairs, pair: Integers, place: Floats, near: Floats) -> tuple[Floats, Floats, Floats]:
+def _onward(
+    pairs: Pairs, pair: Integers, place: Floats, near: Floats, tangent: bool = False
+) -> tuple[Floats, Floats, Floats]:
     """The unit direction that keeps what lies deeper on its left, and the step of Newton's method to the curve."""
-    height, slopes, where, _ = pairs.heights(pair, place[:, :1], place[:, 1:], near[:, None])
+    height, slopes, where, _ = pairs.heights(pair, place[:, :1], place[:, 1:], near[:, None], tangent)
     slope, height = slopes[:, 0], height[:, 0]
     steepness = np.maximum(np.sum(slope * slope, axis=1), np.finfo(float).tiny)
     turned = np.stack([slope[:, 1], -slope[:, 0]], axis=-1) / np.sqrt(steepness)[:, None]
@@ -186,12 +188,12 @@ def _step(
     near_there = near_half
     moved = np.zeros(len(place))
     for _ in range(3):
-        there, back, near_there = _onward(pairs, pair, tried, near_there)
+        there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
         moved = np.maximum(moved, np.linalg.norm(back, axis=1))
         far = np.linalg.norm(back, axis=1) > length
         back[far] *= (length[far] / np.linalg.norm(back[far], axis=1))[:, None]
         tried = tried + back
-    there, back, near_there = _onward(pairs, pair, tried, near_there)
+    there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
     return tried, there, near_there, (moved < _ASTRAY * length) & (np.linalg.norm(back, axis=1) < 1e-3 * length)
 
 
@@ -315,7 +317,7 @@ def _on_curves(
     at = place.copy()
     back = np.zeros_like(at)
     for _ in range(8):
-        height, slopes, where, _ = pairs.heights(pair, at[:, :1], at[:, 1:], near)
+        height, slopes, where, _ = pairs.heights(pair, at[:, :1], at[:, 1:], near, tangent=True)
         near, back = where, level_step(height, slopes)[:, 0]
         length = np.linalg.norm(back, axis=1)
         at = at + back * np.minimum(1, step / np.maximum(length, step))[:, None]

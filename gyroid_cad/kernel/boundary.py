@@ -222,14 +222,17 @@ def _of_spline(spline: Geom_BSplineSurface) -> Derivatives | None:
         return None
     # By scipy, which looks at the few functions alone that do not vanish: lofts have a hundred along each parameter.
     weights = surface.weights[..., np.newaxis]
-    plain = NdBSpline(knots, surface.control_points * weights, degrees)
-    below = None if np.ptp(weights) == 0 else NdBSpline(knots, weights, degrees)
+    rational = np.ptp(weights) > 0
+    together = NdBSpline(
+        knots, np.concatenate([surface.control_points * weights, weights[..., : int(rational)]], -1), degrees
+    )
 
     def found(places: Floats, order: int) -> tuple[Floats, ...]:
-        values = {of: plain(places, nu=of) for of in orders(order, 2)}
-        if below is None:
+        values = {of: together(places, nu=of) for of in orders(order, 2)}
+        if not rational:
             return tuple(value / surface.weights[0, 0] for value in values.values())
-        return tuple(quotients(values, {of: below(places, nu=of) for of in orders(order, 2)}).values())
+        above, below = ({of: value[:, part] for of, value in values.items()} for part in (slice(3), slice(3, 4)))
+        return tuple(quotients(above, below).values())
 
     return found
 

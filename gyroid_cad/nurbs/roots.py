@@ -21,7 +21,7 @@ _CONVERGED, _SQUARED = 1e-14, 1e-9
 _ROUNDING = 1e-13
 # A parabola that turns back between samples comes at most an eighth of its second difference nearer zero than they do.
 _HIDDEN = 1 / 4
-# Steps to the nearest place, and how small the last is: what that leaves in the distance is its square.
+# Steps to the nearest place, and how small the last is, whose square is what it leaves.
 _NEAREST_STEPS, _NEAREST_CONVERGED = 40, 1e-8
 # How long the first step may be, in the square's parameters; and how far a squared distance must bend upwards at least,
 # in parts of the squared derivatives.
@@ -188,13 +188,13 @@ def nearest_places(
     for _ in range(_NEAREST_STEPS):
         tried = np.clip(place + _downhill(place, points, found, reach), -1, 1)
         length = np.abs(tried - place).max(axis=1)
-        if length.max(initial=0.0) < _NEAREST_CONVERGED:
-            break
         there = derivatives(*tried.T)
         away = np.linalg.norm(points - there[0], axis=-1)
         nearer = away <= distance
         reach = np.where(nearer, 2 * reach, length / 4)
         place, distance = np.where(nearer[:, np.newaxis], tried, place), np.where(nearer, away, distance)
+        if length.max(initial=0.0) < _NEAREST_CONVERGED:
+            break
         found = tuple(np.where(nearer[:, np.newaxis], new, old) for new, old in zip(there, found, strict=True))
     return place[:, 0], place[:, 1], distance
 

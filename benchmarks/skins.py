@@ -106,7 +106,7 @@ def _comes_back(core: TopoDS_Shape) -> bool:
     with TemporaryDirectory() as folder:
         path = Path(folder, "core.step")
         try:
-            write_step(core, path, parameter_curves=True)
+            write_step(core, path)
         except GyroidError:
             return False
         return topology(read_step(path)) == topology(core)

@@ -19,7 +19,7 @@ from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.triangle_part import TrianglePart, triangle_part
 from gyroid_cad.kernel.part import AS_FAR, ON_FACE, OPENINGS, selected_way
-from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
+from gyroid_cad.mesh.triangles.booleans import Body, body_of
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.level_set import Grid, level_surface, told_apart
 from gyroid_cad.trim.islands import SealedVoid
@@ -93,6 +93,10 @@ class _Depth:
             return -signed - self._skin
         return np.minimum(self._walls.away(points) - self._skin, _BEYOND * self._skin - signed)
 
+    def between(self, points: Floats) -> Floats:
+        """The same at places less than the skin away from some in the core: on which side they are needs no telling."""
+        return self(points) if self._open else self._walls.away(points) - self._skin
+
     def normals(self, points: Floats) -> Floats:
         """Out of the core: towards the nearest place of the skin's outside, or away from that of an opening."""
         return self._nearest(points)[1]
@@ -140,7 +144,7 @@ def _core_within(part: TrianglePart, skin: float, depth: _Depth, deviation: floa
         inside = told_apart(depth, grid)
         if not inside.any():
             raise ParameterError("skin", skin, _thinner(part))
-        vertices, triangles = level_surface(inside, grid, depth, depth.normals, depth.project)
+        vertices, triangles = level_surface(inside, grid, depth.between, depth.normals, depth.project)
         body = body_of(vertices, triangles)
         if body is not None and body.volume > 0:
             return body
@@ -206,20 +210,23 @@ def given_core(part: TrianglePart, core: Any, deviation: float) -> tuple[Body, f
 
 def without_small_voids(
     pieces: Sequence[Body], part: Body, middle: Floats, least: float
-) -> tuple[list[Body], list[SealedVoid]]:
-    """Pieces without voids below a volume in mm3, and the voids they seal but for the part's own, the largest first."""
-    left: list[Body] = []
+) -> tuple[list[list[Body]], list[SealedVoid]]:
+    """Shells of pieces without voids below a volume in mm3, and the voids they seal but for the part's own.
+
+    The largest void comes first.
+    """
+    left: list[list[Body]] = []
     voids: list[SealedVoid] = []
     own = part.moved(-middle) if part.void_count else None
     for piece in pieces:
-        shells = piece.void_shells()
+        shells, sealed = piece.shells()
         if own is not None:
-            shells = [shell for shell in shells if (shell.inside_out() & own).volume > 0]
-        voids += [
-            SealedVoid(-shell.volume, _point(shell.centre + middle)) for shell in shells if -shell.volume >= least
-        ]
-        specks = [shell.inside_out() for shell in shells if -shell.volume < least]
-        left.append(piece | united(specks) if specks else piece)
+            parted = [(shell.inside_out() & own).volume > 0 for shell in sealed]
+            shells = shells + [shell for shell, in_part in zip(sealed, parted, strict=True) if not in_part]
+            sealed = [shell for shell, in_part in zip(sealed, parted, strict=True) if in_part]
+        sealed = [shell for shell in sealed if -shell.volume >= least]
+        left.append([*shells, *sealed])
+        voids += [SealedVoid(-shell.volume, _point(shell.centre + middle)) for shell in sealed]
     return left, sorted(voids, key=lambda void: -void.volume)
 
 

@@ -170,21 +170,23 @@ class TriangleFilling:
         with timed(self.seconds, "triangles", self.progress):
             wall = self._wall()
         with timed(self.seconds, "cut", self.progress):
-            part, core = self.part.moved(-self.middle), None if self.core is None else self.core.moved(-self.middle)
+            part, core = self._placed(self.part), None if self.core is None else self._placed(self.core)
             if self.regions[0].name == SHEET:
                 sheet = part & wall if core is None else part - self._rounded(core - wall, part, core)
                 found: dict[str, Body] = {SHEET: sheet}
             else:
                 found = self._between(part, core, wall)
-            simpler = {name: body.simplified(_SIMPLER * self.deviation) for name, body in found.items()}
-        if all(body.empty for body in simpler.values()):
+        if all(body.empty for body in found.values()):
             raise KernelError("nothing of the lattice lies in the part")
-        return {name: body for name, body in simpler.items() if not body.empty}
+        return {name: body for name, body in found.items() if not body.empty}
 
     @property
     def middle(self) -> Floats:
         """Point that is brought to the origin, where single precision is finest, in mm; shape (3,)."""
         return np.asarray(self.part.bounds.mean(axis=0))
+
+    def _placed(self, body: Body) -> Body:
+        return body.moved(-self.middle).tolerant(_SIMPLER * self.deviation)
 
     def _wall(self) -> Body:
         wall = self.infill.wall.moved(np.eye(3), -self.middle)
@@ -328,24 +330,25 @@ class TriangleJob:
         with timed(seconds, "check", self.progress):
             pieces = {name: body.pieces() for name, body in domains.items()}
             kept, islands = without_islands(pieces, inner.body.volume / self.cell_size**3, self.rule)
-            left = [piece for some in kept.values() for piece in some]
-            voids: list[SealedVoid] = []
+            whole = [piece for some in kept.values() for piece in some]
+            left, voids = [[piece] for piece in whole], list[SealedVoid]()
             if not any(region.fluid for region in self.regions):
-                left, voids = without_small_voids(left, part.body, filling.middle, speck_below(self.cell_size))
-            places = _arrays(left, filling.middle, deviation)
+                left, voids = without_small_voids(whole, part.body, filling.middle, speck_below(self.cell_size))
+            places = _arrays([shell for shells in left for shell in shells], filling.middle, deviation)
         return places, self._report(filling, left, islands, voids, skin, len(places[1])), islands
 
     def _report(
         self,
         filling: TriangleFilling,
-        pieces: Sequence[Body],
+        pieces: Sequence[Sequence[Body]],
         islands: Islands,
         voids: Sequence[SealedVoid],
         skin: float | None,
         count: int,
     ) -> FillReport:
         infill, part = filling.infill, filling.part
-        volume = sum(piece.volume for piece in pieces)
+        shells = [shell for piece in pieces for shell in piece]
+        volume = sum(shell.volume for shell in shells)
         walls = [] if self.kind in (NETWORK_A, NETWORK_B) else [infill.min_thickness]
         return FillReport(
             kind=self.kind,
@@ -360,7 +363,7 @@ class TriangleJob:
             part_volume=part.volume,
             volume=volume,
             density=volume / part.volume,
-            area=sum(piece.area for piece in pieces),
+            area=sum(shell.area for shell in shells),
             mass=None if self.grams is None else self.grams * volume,
             part_mass=None if self.grams is None else self.grams * part.volume,
             islands=islands.kept,
@@ -380,9 +383,9 @@ class TriangleJob:
         )
 
 
-def _arrays(pieces: Sequence[Body], middle: Floats, deviation: float) -> tuple[Floats, Integers]:
-    """Vertices and triangles of all pieces where they stand; as single precision has them, if that is fine enough."""
-    vertices, triangles = _together([piece.triangles() for piece in pieces])
+def _arrays(shells: Sequence[Body], middle: Floats, deviation: float) -> tuple[Floats, Integers]:
+    """Vertices and triangles of all shells where they stand; as single precision has them, if that is fine enough."""
+    vertices, triangles = _together([shell.triangles() for shell in shells])
     vertices = vertices + middle
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     if is_coarse(float(np.abs(vertices).max()), size, deviation):

@@ -1,4 +1,4 @@
-"""Assemblies of STEP files, with names and colours, through the kernel's document (XCAF): written, and read."""
+"""Assemblies of STEP files: written with names and colours, and read through the kernel's document (XCAF)."""
 
 from __future__ import annotations
 
@@ -6,20 +6,10 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from OCP.gp import gp_Trsf, gp_Vec
 from OCP.IFSelect import IFSelect_RetDone
-from OCP.Quantity import (
-    Quantity_Color,
-    Quantity_NameOfColor,
-    Quantity_NOC_GREEN,
-    Quantity_NOC_RED,
-    Quantity_NOC_YELLOW,
-)
-from OCP.STEPCAFControl import STEPCAFControl_Reader, STEPCAFControl_Writer
-from OCP.STEPControl import STEPControl_AsIs
-from OCP.StepData import StepData_StepModel
-from OCP.StepRepr import StepRepr_NextAssemblyUsageOccurrence, StepRepr_RepresentationItem
-from OCP.TCollection import TCollection_ExtendedString, TCollection_HAsciiString
+from OCP.STEPCAFControl import STEPCAFControl_Reader
+from OCP.StepRepr import StepRepr_RepresentationItem
+from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
@@ -27,24 +17,29 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
-from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
-from gyroid_cad.kernel.step import fill_header, product_name, reading_step, step_of_kernel
+from gyroid_cad.kernel.step import product_name, reading_step, write_parts
+from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart
+from gyroid_cad.kernel.step_solids import read_solids
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 
 # Of those that STEP knows by name (draughting_pre_defined_colour), so that no reader rounds them.
-YELLOW, RED, GREEN = Quantity_NOC_YELLOW, Quantity_NOC_RED, Quantity_NOC_GREEN
+YELLOW, RED, GREEN = "yellow", "red", "green"
 
 # What the kernel's writer calls a product that has no name; its occurrences it then numbers.
 _NAMELESS = "Open CASCADE STEP translator"
 # Of the document's unit of length, in metres: lengths are in mm.
 _MILLIMETRE = 1e-3
 _BINARY_DOCUMENT = "BinXCAF"
+# Of a copy that is only shifted: z and x.
+_AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 
 Place = tuple[str, tuple[float, float, float]]
 
@@ -55,7 +50,7 @@ class NamedFace:
 
     face: TopoDS_Face
     name: str
-    colour: Quantity_NameOfColor
+    colour: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +61,18 @@ class NamedPart:
     ----------
     shape : TopoDS_Shape
     name : str
-    colour : Quantity_NameOfColor
+    colour : str
         Of the whole.
     faces : list of NamedFace
+        All of them, as the kernel counts them.
+    size : ShapeSize
     """
 
     shape: TopoDS_Shape
     name: str
-    colour: Quantity_NameOfColor
+    colour: str
     faces: list[NamedFace]
+    size: ShapeSize
 
 
 def write_assembly(
@@ -102,16 +100,12 @@ def write_assembly(
     ParameterError, ExportError
     """
     product = product_name(path, name)
-    with step_of_kernel(part.shape, path, schema, product) as raw:
-        document = new_document()
-        _fill(document, part, places, product)
-        writer = STEPCAFControl_Writer()
-        if not writer.Transfer(document, STEPControl_AsIs):
-            raise ExportError(f"{path} was not written: the kernel could not translate the assembly to STEP")
-        fill_header(writer.ChangeWriter(), product)
-        _number_occurrences(writer.ChangeWriter().Model())
-        if writer.Write(str(raw)) != IFSelect_RetDone:
-            raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+    require_schema(schema)
+    names, colours = [named.name for named in part.faces], [named.colour for named in part.faces]
+    written = StepPart(part.name, read_solids(part.shape), part.colour, names, colours, part.size)
+    occurrences = [Occurrence(0, called, (place, *_AXES)) for called, place in places]
+    whole = ShapeSize(len(occurrences) * part.size.volume, len(occurrences) * part.size.area)
+    write_parts(part.shape, path, schema, product, [written], occurrences, whole)
 
 
 def new_document() -> TDocStd_Document:
@@ -175,35 +169,3 @@ def _leaves(labels: LabelSequence, place: TopLoc_Location) -> Iterator[tuple[TDF
 def _named(label: TDF_Label) -> str:
     name = TDataStd_Name()
     return str(name.Get().ToExtString()) if label.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
-
-
-def _fill(document: TDocStd_Document, part: NamedPart, places: Iterable[Place], product: str) -> None:
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
-    cell = shapes.AddShape(part.shape, False)
-    _name(cell, part.name)
-    colours.SetColor(cell, Quantity_Color(part.colour), XCAFDoc_ColorGen)
-    for named in part.faces:
-        face = shapes.AddSubShape(cell, named.face)
-        _name(face, named.name)
-        if named.colour != part.colour:
-            colours.SetColor(face, Quantity_Color(named.colour), XCAFDoc_ColorSurf)
-    assembly = shapes.NewShape()
-    _name(assembly, product)
-    for name, translation in places:
-        transformation = gp_Trsf()
-        transformation.SetTranslation(gp_Vec(*translation))
-        _name(shapes.AddComponent(assembly, cell, TopLoc_Location(transformation)), name)
-    shapes.UpdateAssemblies()
-
-
-def _number_occurrences(model: StepData_StepModel) -> None:
-    """Count from 1 in every file: the kernel counts on through the process, which would make each file another."""
-    entities = (model.Value(number) for number in range(1, model.NbEntities() + 1))
-    occurrences = (entity for entity in entities if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence))
-    for number, occurrence in enumerate(occurrences, 1):
-        occurrence.SetId(TCollection_HAsciiString(str(number)))
-
-
-def _name(label: TDF_Label, name: str) -> None:
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))

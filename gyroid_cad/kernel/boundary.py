@@ -43,7 +43,7 @@ from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedg
 from gyroid_cad.trim.free_surfaces import FreeForm, Swept
 from gyroid_cad.trim.surfaces import PartSurface, Quadric, QuadricKind
 
-__all__ = ["ReadBoundary", "read_boundary"]
+__all__ = ["ReadBoundary", "part_surface", "read_boundary"]
 
 Floats = NDArray[np.float64]
 # From parameters (n,) to points and derivatives; from two of them to points and derivatives by s, t, ss, st and tt.
@@ -106,7 +106,7 @@ def _face(face: TopoDS_Face, edges: NumberedShapes) -> BoundaryFace:
     )
     sign = -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
     made = BoundaryFace(None, sign, loops, periods, low, high)  # type: ignore[arg-type]
-    made.surface = _surface(adaptor, made)
+    made.surface = part_surface(adaptor, made.range)
     return made
 
 
@@ -139,14 +139,22 @@ def _edge(edge: TopoDS_Edge, vertices: NumberedShapes) -> BoundaryEdge:
     return BoundaryEdge(curve, first, last, start, end, BRep_Tool.Tolerance_s(edge))
 
 
-def _surface(adaptor: BRepAdaptor_Surface, face: BoundaryFace) -> PartSurface:
+def part_surface(adaptor: BRepAdaptor_Surface, extent: tuple[Floats, Floats]) -> PartSurface:
+    """Surface of a face, by formulas where it has them.
+
+    Parameters
+    ----------
+    adaptor : BRepAdaptor_Surface
+    extent : tuple of ndarray, shape (2,)
+        Least and largest parameters.
+    """
     kind = adaptor.GetType()
     if (simple := _QUADRICS.get(kind)) is not None:
         name, get, sizes = simple
         element = getattr(adaptor, get)()
         quadric = Quadric(name, *_placed(element.Position()), *(getattr(element, size)() for size in sizes))
-        return replace(quadric, crossed=quadric.crosses_at(np.mean(face.range, axis=0)))
-    free = FreeForm(_derivatives(adaptor), *face.range, _breaks(adaptor))
+        return replace(quadric, crossed=quadric.crosses_at(np.mean(extent, axis=0)))
+    free = FreeForm(_derivatives(adaptor), *extent, _breaks(adaptor))
     if kind == GeomAbs_SurfaceOfExtrusion:
         direction = np.array(_values(adaptor.Direction()))
         return Swept(free, np.zeros(3), direction, _curve_in_space(adaptor.BasisCurve(), 2), False)

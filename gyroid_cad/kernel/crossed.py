@@ -278,7 +278,7 @@ def sizes_of(
                 sign = 1.0 if face.Orientation() == orientations[index] else -1.0
                 flux, size = sign * float(measures.flux[index]), float(measures.area[index])
             else:
-                flux, size = measure_about(face, middle)
+                flux, size = measure_about(as_face(face), middle)
             volume, area = volume + flux, area + size
         sizes.append((volume, area))
     return sizes

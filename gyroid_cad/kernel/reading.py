@@ -64,7 +64,7 @@ def described(shape: TopoDS_Shape) -> Described:
 
 def shown_triangles(
     shape: TopoDS_Shape, extent: float | None = None
-) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangles to look at: vertices, their numbers, and faces, as of :func:`gyroid_cad.kernel.stl.meshed_by_face`.
 
     Parameters

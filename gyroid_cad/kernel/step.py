@@ -1,12 +1,11 @@
-"""STEP files (ISO 10303-21) through ``STEPControl_Writer`` and ``STEPControl_Reader``."""
+"""STEP files (ISO 10303-21): written, counted in their own text, and read by the kernel."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from threading import RLock
 from types import MappingProxyType
@@ -30,46 +29,23 @@ from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
+from gyroid_cad.kernel.step_geometry import UnknownGeometryError
+from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart, products_of, time_stamp, write_products
 from gyroid_cad.version import __version__
 
 __all__ = [
-    "compact_step",
-    "fill_header",
     "no_messages",
     "product_name",
     "read_step",
     "reading_step",
-    "step_of_kernel",
     "topology_in_step",
+    "write_parts",
     "write_step",
 ]
 
-# 5e-11 of a coordinate, under 1e-8 mm for parts below 200 mm: a tenth of the kernel's tolerance.
-_SIGNIFICANT_DIGITS = 10
-# Coordinates are rounding noise about 0 below this, in mm.
-_NOISE_DECIMALS = 12
-
-_POINT = re.compile(r"#(\d+) = CARTESIAN_POINT\('',\(([^()]*)\)\s*\);")
-_REFERENCE = re.compile(r"#(\d+)")
-_SPLINE = "B_SPLINE_"
 _KIND = re.compile(r"#\d+\s*=\s*(\w+)\s*\(")
 _USE = re.compile(r"#\d+\s*=\s*ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+)")
 _COUNTED = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "ADVANCED_FACE", "FACE_SURFACE")
-
-
-def compact_step(source: Path, target: Path) -> None:
-    """Rewrite a STEP file of the kernel's writer.
-
-    Parameters
-    ----------
-    source : Path
-        As ``STEPControl_Writer`` left it.
-    target : Path
-        Another file.
-    """
-    points = _Points(source)
-    with source.open(encoding="utf-8") as lines, target.open("w", encoding="utf-8", newline="\n") as out:
-        out.writelines(_rewritten(entity, points) for entity in _entities(lines))
 
 
 def topology_in_step(path: str | os.PathLike[str]) -> Topology:
@@ -125,61 +101,6 @@ def _entities(lines: TextIO) -> Iterator[str]:
     yield pending
 
 
-class _Points:
-    """Points of a file, rounded.
-
-    Attributes
-    ----------
-    texts : dict
-        The coordinates of each point, by its id.
-    shared : dict
-        For each pole that repeats an earlier point, the earlier one's id.
-    """
-
-    def __init__(self, source: Path) -> None:
-        self.texts: dict[str, str] = {}
-        first: dict[str, str] = {}
-        shared: dict[str, str] = {}
-        used_elsewhere: set[str] = set()
-        with source.open(encoding="utf-8") as lines:
-            for entity in _entities(lines):
-                if point := _POINT.match(entity):
-                    number, rounded = point[1], _rounded(point[2])
-                    original = first.setdefault(rounded, number)
-                    if original == number:
-                        self.texts[number] = rounded
-                    else:
-                        # One string for all that are alike.
-                        self.texts[number] = self.texts[original]
-                        shared[number] = original
-                elif _SPLINE not in entity:
-                    used_elsewhere.update(_REFERENCE.findall(entity))
-        self.shared = {number: original for number, original in shared.items() if number not in used_elsewhere}
-
-
-def _rewritten(entity: str, points: _Points) -> str:
-    if point := _POINT.match(entity):
-        number = point[1]
-        return "" if number in points.shared else f"#{number}=CARTESIAN_POINT('',({points.texts[number]}));\n"
-    if entity.startswith("#") and _SPLINE in entity:
-        unfolded = "".join(part.strip() for part in entity.splitlines()).replace(" = ", "=", 1)
-        return _REFERENCE.sub(lambda match: "#" + points.shared.get(match[1], match[1]), unfolded) + "\n"
-    return entity
-
-
-def _rounded(coordinates: str) -> str:
-    return ",".join(map(_real, coordinates.split(",")))
-
-
-def _real(text: str) -> str:
-    """A number as ISO 10303-21 wants it: always with a point, an exponent in capitals."""
-    number = f"{round(float(text), _NOISE_DECIMALS) + 0.0:.{_SIGNIFICANT_DIGITS}G}"
-    if "." in number:
-        return number
-    mantissa, mark, exponent = number.partition("E")
-    return f"{mantissa}.{mark}{exponent}"
-
-
 # A host that wrote a file in inches leaves the kernel taking all lengths of shapes for inches.
 _OF_LENGTHS: Mapping[str, str | int] = MappingProxyType({"xstep.cascade.unit": "MM"})
 
@@ -189,11 +110,14 @@ def write_step(
     path: str | os.PathLike[str],
     schema: Schema = "ap214",
     name: str | None = None,
-    parameter_curves: bool = False,
+    size: ShapeSize | None = None,
 ) -> None:
     """Write a shape in millimetres.
 
-    Points that faces and edges have in common are written once.
+    Solids whose geometry STEP has words for are written from arrays, with what faces and edges have in common once,
+    and without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so
+    that readers find those curves again, and files are a third smaller. Of anything else, such as an offset surface,
+    a face of no solid or a mirrored copy, the kernel's own writer makes the file, with these curves.
 
     Parameters
     ----------
@@ -203,65 +127,75 @@ def write_step(
     schema : {"ap214", "ap242"}
     name : str, optional
         Of the product; the file's stem if left out.
-    parameter_curves : bool
-        Whether to write curves in the parameter plane. Every edge of a lattice is a border line of its surface, which
-        readers find again at once; where faces are cut they are needed.
+    size : ShapeSize, optional
+        For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
 
     Raises
     ------
     ParameterError, ExportError
     """
-    product = product_name(path, name)
-    with step_of_kernel(shape, path, schema, product, parameter_curves) as raw:
-        writer = STEPControl_Writer()
-        if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
-            raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
-        fill_header(writer, product)
-        _name_product(writer, product)
-        if writer.Write(str(raw)) != IFSelect_RetDone:
-            raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+    product, kernel_schema = product_name(path, name), require_schema(schema)
+    try:
+        parts, places = products_of(shape, product)
+    except UnknownGeometryError:
+        _write_by_kernel(shape, path, kernel_schema, product)
+    else:
+        write_parts(shape, path, schema, product, parts, places, size)
 
 
-@contextmanager
-def step_of_kernel(
-    shape: TopoDS_Shape, path: str | os.PathLike[str], schema: Schema, product: str, parameter_curves: bool = False
-) -> Iterator[Path]:
-    """Give a name for what the kernel's writer writes; what is there is made compact, looked at and moved into place.
-
-    The kernel's settings are global to the process, and count when a writer makes its model: they hold inside.
+def write_parts(
+    shape: TopoDS_Shape,
+    path: str | os.PathLike[str],
+    schema: Schema,
+    product: str,
+    parts: Sequence[StepPart],
+    places: Sequence[Occurrence] = (),
+    size: ShapeSize | None = None,
+) -> None:
+    """Write parts that were read from a shape, and look whether the file holds it all.
 
     Parameters
     ----------
     shape : TopoDS_Shape
-        That the file is to hold, once.
     path : path-like
+        Written under a temporary name and moved into place.
     schema : {"ap214", "ap242"}
     product : str
-        Name of a product that is given none.
-    parameter_curves : bool
-        As of :func:`write_step`.
+        Name of the whole.
+    parts : sequence of StepPart
+    places : sequence of Occurrence
+        None, if there is one part.
+    size : ShapeSize, optional
+        Of all of it.
 
     Raises
     ------
-    ParameterError, ExportError
+    ExportError
     """
+    with replacing(path) as temporary:
+        write_products(temporary, product, parts, places, schema, size)
+        _require_whole(path, temporary, shape)
+
+
+def _write_by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], schema: str, product: str) -> None:
+    """Write with the kernel's own writer, whose settings are global to the process, and count as it makes its model."""
     settings: dict[str, str | int] = {
-        "write.step.schema": require_schema(schema),
+        "write.step.schema": schema,
         "write.step.unit": "MM",
         **_OF_LENGTHS,
         "write.step.product.name": product,
-        "write.surfacecurve.mode": int(parameter_curves),
-        # Of an assembly: the names of the faces of its parts.
-        "write.stepcaf.subshapes.name": 1,
+        "write.surfacecurve.mode": 1,
     }
-    with replacing(path) as temporary, no_messages(), _kernel_settings(settings):
-        raw = temporary.with_name(f"{temporary.name}.raw")
-        try:
-            yield raw
-            compact_step(raw, temporary)
-            _require_whole(path, temporary, shape)
-        finally:
-            raw.unlink(missing_ok=True)
+    with replacing(path) as temporary:
+        with no_messages(), _kernel_settings(settings):
+            writer = STEPControl_Writer()
+            if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
+                raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
+            _fill_header(writer, product)
+            _name_product(writer, product)
+            if writer.Write(str(temporary)) != IFSelect_RetDone:
+                raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
+        _require_whole(path, temporary, shape)
 
 
 def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
@@ -298,8 +232,8 @@ def reading_step() -> Iterator[None]:
         yield
 
 
-def fill_header(writer: STEPControl_Writer, product: str) -> None:
-    """Say what the file is, by whom and, if ``SOURCE_DATE_EPOCH`` is set, of that moment."""
+def _fill_header(writer: STEPControl_Writer, product: str) -> None:
+    """Say what the file is, by whom, and of when."""
     header = APIHeaderSection_MakeHeader(writer.Model())
     text = TCollection_HAsciiString
     header.SetName(text(product))
@@ -308,10 +242,7 @@ def fill_header(writer: STEPControl_Writer, product: str) -> None:
     header.SetDescriptionValue(1, text("gyroid lattice"))
     header.SetOriginatingSystem(text(f"gyroid_cad {__version__}"))
     header.SetAuthorisation(text(""))
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if epoch.isdigit():
-        # The convention for reproducible builds: the file's date is the one given, in UTC.
-        header.SetTimeStamp(text(datetime.fromtimestamp(int(epoch), UTC).strftime("%Y-%m-%dT%H:%M:%S")))
+    header.SetTimeStamp(text(time_stamp()))
 
 
 def _name_product(writer: STEPControl_Writer, product: str) -> None:

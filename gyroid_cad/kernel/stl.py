@@ -1,8 +1,10 @@
-"""Triangles of a solid by the kernel's mesher, as binary STL or as arrays."""
+"""Triangles of a solid as binary STL or as arrays, by the kernel's mesher where ours do not close."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from contextlib import suppress
 from math import radians
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,139 +24,128 @@ from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
-from gyroid_cad.errors import ExportError, ParameterError
-from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.errors import ExportError, KernelError, ParameterError
+from gyroid_cad.kernel.check import compound_of, parts_of
 from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
 from gyroid_cad.kernel.extent import box_round, corners_of
+from gyroid_cad.kernel.outlines import face_triangles
 from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.surfaces import translation
-from gyroid_cad.mesh.triangles.files import binary_stl_corners, keep_facets, numbered_corners
+from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners, renumbered
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.triangulation import parting
+from gyroid_cad.mesh.triangles.writing import storable_triangles, write_triangles
 
 __all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "solid_triangles", "write_meshed_stl"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+# Vertices, triangles, and the face of each triangle.
+Body = tuple[Floats, Integers, Integers]
 
-# Parts of the deviation that are tried one after the other, until the mesh is closed.
+# Parts of the deviation that the kernel's mesher is asked for, one after the other, until its mesh is closed.
 _FINER = (1.0, 0.5, 0.2, 0.05)
 
 
 def write_meshed_stl(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
 ) -> None:
-    """Mesh a solid (``BRepMesh_IncrementalMesh``) and write it as binary STL, in millimetres.
+    """Write the triangles of a solid as binary STL, in millimetres: those of :func:`closed_triangles`.
 
-    STL knows nothing but coordinates: where the solid touches itself in a line, four triangles would share an
-    edge. There the vertices, which are distinct in the solid, are moved apart by a thousandth of the deviation.
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    write_triangles(*closed_triangles(shape, path, deviation, angle), path)
 
-    What the mesher leaves open is meshed again, more finely; what stays open is not written.
+
+def closed_triangles(
+    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> tuple[Floats, Integers]:
+    """Triangles of a shape that are closed, and stay so when a file knows nothing but coordinates.
+
+    Solids are closed one by one; where they, or a solid and itself, touch, vertices are moved apart by some steps of
+    single precision. Nothing that stays open is given.
 
     Parameters
     ----------
     shape : TopoDS_Shape
-        Left without triangles: a copy that shares its geometry is meshed.
+        Left without triangles.
     path : path-like
+        Named where it can't be written.
     deviation : float
         Largest distance of a facet from the surface, in mm.
     angle : float
         Largest angle between neighbouring facets, in degrees.
 
-    Raises
-    ------
-    ParameterError, ExportError
-    """
-    with replacing(path) as temporary:
-        for finer in _FINER:
-            _write(_meshed_copy(shape, path, deviation * finer, angle), temporary, path)
-            _, triangles, kept = numbered_corners(binary_stl_corners(temporary))
-            if not unmatched_edges(triangles):
-                break
-        else:
-            raise _left_open(path, triangles, deviation)
-        keep_facets(temporary, kept)
-
-
-def closed_triangles(
-    shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
-    """Triangles of a solid as :func:`meshed` makes them, and more finely where those are open.
+    Returns
+    -------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
 
     Raises
     ------
     ParameterError, ExportError
     """
-    for finer in _FINER:
-        vertices, triangles = meshed(shape, path, deviation * finer, angle)
-        if not unmatched_edges(triangles):
-            return vertices, triangles
-    raise _left_open(path, triangles, deviation)
+    near, away = _near_origin(shape, deviation)
+    vertices, triangles, _ = _together(_bodies(near, path, deviation, angle))
+    try:
+        vertices, triangles = storable_triangles(vertices, triangles)
+    except ExportError:
+        raise _left_open(path, renumbered(vertices.astype(np.float32), triangles)[1], deviation) from None
+    return vertices + away, triangles
 
 
 def _left_open(path: str | os.PathLike[str], triangles: NDArray[np.integer], deviation: float) -> ExportError:
     return ExportError(
-        f"{path} was not written: with deviation = {deviation:g} mm, and with less, the kernel's mesher leaves "
-        f"{unmatched_edges(triangles)} edges that two triangles do not share; another deviation may do"
+        f"{path} was not written: with deviation = {deviation:g} mm {unmatched_edges(triangles)} edges are not shared "
+        "by two triangles; another deviation may do, and a part filled by --route triangles is closed whatever it is"
     )
 
 
 def meshed(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
-    """Triangles of a shape as arrays, for formats other than STL.
-
-    They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
-    Python. Corners are the same where their coordinates are, to the last bit, as in any STL. A shape so far off that
-    single precision would be too coarse there is brought near the origin for that, and the triangles back.
-
-    Returns
-    -------
-    vertices : ndarray, shape (vertices, 3)
-        In mm.
-    triangles : ndarray of int32, shape (triangles, 3)
+) -> tuple[Floats, Integers]:
+    """Triangles of a shape as :func:`closed_triangles` makes them; of one that stays open as they are.
 
     Raises
     ------
     ParameterError, ExportError
     """
-    vertices, triangles, _ = meshed_by_face(shape, path, deviation, angle)
-    return vertices, triangles
+    near, away = _near_origin(shape, deviation)
+    vertices, triangles, _ = _together(_bodies(near, path, deviation, angle))
+    if not unmatched_edges(triangles):
+        with suppress(ExportError):
+            vertices, triangles = storable_triangles(vertices, triangles)
+    return vertices + away, triangles
 
 
 def meshed_by_face(
     shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> tuple[NDArray[np.floating], NDArray[np.int32], NDArray[np.int64]]:
-    """Triangles as :func:`meshed` makes them, and the face that each lies on, as ``TopExp_Explorer`` counts faces.
+) -> tuple[Floats, Integers, Integers]:
+    """Triangles of a shape, and the face that each lies on, as ``TopExp_Explorer`` counts faces.
 
     Returns
     -------
     vertices : ndarray, shape (vertices, 3)
-        In mm.
-    triangles : ndarray of int32, shape (triangles, 3)
+        In mm; each body has its own.
+    triangles : ndarray of int, shape (triangles, 3)
     faces : ndarray of int, shape (triangles,)
 
     Raises
     ------
     ParameterError, ExportError
     """
-    away = _brought_near(shape, deviation)
-    copy = _meshed_copy(shape if away is None else shape.Moved(translation((-away).tolist())), path, deviation, angle)
-    with TemporaryDirectory() as folder:
-        file = Path(folder) / "triangles.stl"
-        _write(copy, file, path)
-        vertices, triangles, kept = numbered_corners(binary_stl_corners(file))
-    # The kernel writes them face by face.
-    counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
-    faces = np.repeat(np.arange(len(counts)), counts)[kept]
-    return vertices if away is None else vertices + away, triangles.astype(np.int32), faces
+    near, away = _near_origin(shape, deviation)
+    vertices, triangles, faces = _together(_bodies(near, path, deviation, angle))
+    return vertices + away, triangles, faces
 
 
 def solid_triangles(shape: TopoDS_Shape, deviation: float) -> list[tuple[Floats, Integers, Integers]]:
-    """Triangles of each solid of a shape, meshed more finely where those of the kernel's mesher are open.
+    """Triangles of each solid of a shape.
 
     A solid that stays open comes as it is: who takes it may repair or refuse it.
 
@@ -175,26 +166,84 @@ def solid_triangles(shape: TopoDS_Shape, deviation: float) -> list[tuple[Floats,
     ParameterError
         If there is no solid.
     """
-    found, count = [], 0
-    for solid in parts_of(shape, TopAbs_SOLID):
-        for finer in _FINER:
-            vertices, triangles, faces = meshed_by_face(solid, "part", deviation * finer)
-            if not unmatched_edges(triangles):
-                break
-        found.append((np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64), faces + count))
-        count += sum(1 for _ in parts_of(solid, TopAbs_FACE))
-    if not found:
+    solids = list(parts_of(shape, TopAbs_SOLID))
+    if not solids:
         kind = shape.ShapeType().name.removeprefix("TopAbs_").lower()
         raise ParameterError("part", kind, "a closed solid: there is none in it")
+    near, away = _near_origin(compound_of(solids), deviation)
+    return [
+        (vertices + away, triangles, faces)
+        for vertices, triangles, faces in _bodies(near, "part", deviation, DEFAULT_ANGLE)
+    ]
+
+
+def _together(bodies: Sequence[Body]) -> Body:
+    """Triangles of several bodies as one list."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in bodies)])
+    return (
+        np.concatenate([np.empty((0, 3)), *(vertices for vertices, _, _ in bodies)]),
+        np.concatenate(
+            [np.empty((0, 3), np.int64), *(own + start for (_, own, _), start in zip(bodies, starts[:-1], strict=True))]
+        ),
+        np.concatenate([np.empty(0, np.int64), *(faces for _, _, faces in bodies)]),
+    )
+
+
+def _bodies(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float) -> list[Body]:
+    """Triangles of each solid of a shape; of one with faces besides, of all together."""
+    require_meshing(deviation, angle)
+    count = sum(1 for _ in parts_of(shape, TopAbs_FACE))
+    solids = list(parts_of(shape, TopAbs_SOLID))
+    counts = [sum(1 for _ in parts_of(solid, TopAbs_FACE)) for solid in solids]
+    bodies, before = [], 0
+    for body, own in zip(solids, counts, strict=True) if sum(counts) == count else [(shape, count)]:
+        vertices, triangles, faces = _body(body, path, deviation, angle)
+        bodies.append((vertices, triangles, faces + before))
+        before += own
+    return bodies
+
+
+def _body(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float) -> Body:
+    """Triangles of the faces of a shape, by the kernel's mesher where ours are refused or do not close."""
+    faces = [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
+    with suppress(KernelError):
+        made = face_triangles(faces, deviation, radians(angle))
+        if not unmatched_edges(made.triangles):
+            return made.vertices, made.triangles, made.faces
+    for finer in _FINER:
+        found = _by_kernel(shape, path, deviation * finer, angle)
+        if not unmatched_edges(found[1]):
+            break
     return found
 
 
-def _brought_near(shape: TopoDS_Shape, deviation: float) -> Floats | None:
-    """Middle of a shape that stands too far off for single precision; None of one that does not."""
+def _by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: float, angle: float) -> Body:
+    """Triangles of the kernel's mesher (``BRepMesh_IncrementalMesh``).
+
+    They go through an STL file of their own, which takes the kernel far less time than being asked for every node from
+    Python. Corners are the same where their coordinates are, to the last bit, as in any STL.
+    """
+    copy = _meshed_copy(shape, path, deviation, angle)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "triangles.stl"
+        writer = StlAPI_Writer()
+        writer.ASCIIMode = False
+        if not writer.Write(copy, str(file)):
+            raise ExportError(f"{path} was not written: the kernel's STL writer failed")
+        vertices, triangles, kept = numbered_corners(binary_stl_corners(file))
+    # The kernel writes them face by face.
+    counts = [_triangle_count(face) for face in parts_of(copy, TopAbs_FACE)]
+    faces = np.repeat(np.arange(len(counts)), counts)[kept]
+    return vertices.astype(np.float64), triangles, faces
+
+
+def _near_origin(shape: TopoDS_Shape, deviation: float) -> tuple[TopoDS_Shape, Floats]:
+    """A shape, moved to the origin if it stands too far off for single precision, and by how much it was moved."""
     low, high = corners_of(box_round([shape]))
     if not is_coarse(float(np.abs([low, high]).max()), float(np.linalg.norm(high - low)), deviation):
-        return None
-    return np.asarray(low + high) / 2
+        return shape, np.zeros(3)
+    middle = np.asarray(low + high) / 2
+    return shape.Moved(translation((-middle).tolist())), middle
 
 
 def _triangle_count(face: TopoDS_Shape) -> int:
@@ -217,13 +266,6 @@ def _meshed_copy(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: f
         raise ExportError(f"{path} was not written: the kernel's mesher failed")
     _part_touching_vertices(copy, deviation)
     return copy
-
-
-def _write(meshed_shape: TopoDS_Shape, file: Path, path: str | os.PathLike[str]) -> None:
-    writer = StlAPI_Writer()
-    writer.ASCIIMode = False
-    if not writer.Write(meshed_shape, str(file)):
-        raise ExportError(f"{path} was not written: the kernel's STL writer failed")
 
 
 def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:

@@ -15,13 +15,22 @@ from math import comb, prod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["basis", "gauss_points", "images", "orders", "quotients", "rational_basis", "uniform_knots"]
+__all__ = [
+    "basis",
+    "component_images",
+    "gauss_points",
+    "images",
+    "orders",
+    "quotients",
+    "rational_basis",
+    "uniform_knots",
+]
 
 Floats = NDArray[np.float64]
 Order = tuple[int, ...]
 
 # Of rows, columns and length of a product.
-_ONE_THREAD = 2**18
+_ONE_THREAD, _ROWS_AT_ONCE = 2**18, 64
 
 
 def uniform_knots(control_points: int, degree: int = 3) -> Floats:
@@ -173,9 +182,6 @@ def rational_basis(weights: Floats, knots: tuple[Floats, ...], places: Floats, o
 def images(matrix: Floats, controls: Floats) -> Floats:
     """Points of many surfaces: products of one matrix of basis functions with the control points of each.
 
-    In portions so small that OpenBLAS keeps to one thread (``GEMM_MULTITHREAD_THRESHOLD`` in its sources): on a busy
-    machine its threads wait for each other, and products of this size take twenty times as long.
-
     Parameters
     ----------
     matrix : ndarray, shape (places, controls)
@@ -185,6 +191,28 @@ def images(matrix: Floats, controls: Floats) -> Floats:
     -------
     ndarray, shape (surfaces, places, components)
     """
-    rows = max(1, _ONE_THREAD // (controls.shape[1] * controls.shape[2]))
-    parts = [matrix[first : first + rows] @ controls for first in range(0, len(matrix), rows)]
-    return np.concatenate(parts, axis=1) if parts else np.empty((len(controls), 0, controls.shape[2]))
+    return np.moveaxis(component_images(matrix, controls), 0, -1)
+
+
+def component_images(matrix: Floats, controls: Floats) -> Floats:
+    """The same, component by component; shape (components, surfaces, places).
+
+    Of all surfaces together, for products with three columns each take twice as long. In portions so small that
+    OpenBLAS keeps to one thread (``GEMM_MULTITHREAD_THRESHOLD`` in its sources): on a busy machine its threads wait for
+    each other, and products of this size take twenty times as long.
+
+    Parameters
+    ----------
+    matrix, controls
+        As of :func:`images`.
+    """
+    count, among, components = controls.shape
+    rows = np.moveaxis(controls, 2, 0).reshape(-1, among)
+    found = np.empty((len(rows), len(matrix)))
+    wide = max(1, _ONE_THREAD // (_ROWS_AT_ONCE * max(among, 1)))
+    for start in range(0, len(matrix), wide):
+        columns = np.ascontiguousarray(matrix[start : start + wide].T)
+        for first in range(0, len(rows), _ROWS_AT_ONCE):
+            part = slice(first, first + _ROWS_AT_ONCE)
+            np.matmul(rows[part], columns, out=found[part, start : start + wide])
+    return found.reshape(components, count, len(matrix))

@@ -357,7 +357,7 @@ def layer_volumes(middle: tuple[Floats, Floats], through: tuple[Floats, Floats],
     half : ndarray, shape (..., 3)
         H itself.
     """
-    constant, _, square = layer_areas(middle, through, half)
+    constant, square = (dot(np.cross(*pair), half) for pair in (middle, through))
     return 2 * constant + 2 / 3 * square
 
 

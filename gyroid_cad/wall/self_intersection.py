@@ -66,6 +66,9 @@ def require_simple(complex: CellComplex, grading: Grading) -> None:
     65 x 65 of patches that come near it. At 9 x 9 of the places the points of both faces are looked up among
     those of all mid-surfaces: none may lie in, or beyond, the wall of a patch it faces or of one that is no neighbour.
 
+    Where no map carries the surface it is enough that the wall is nowhere thicker than a constant one may be: the
+    normals that reach through that one do not meet, so those of a thinner one, however it varies, do not either.
+
     Parameters
     ----------
     complex : CellComplex
@@ -79,6 +82,10 @@ def require_simple(complex: CellComplex, grading: Grading) -> None:
         Naming the place that is furthest from sound, what is there, and what would pass.
     """
     nodes = -np.cos(np.pi * np.arange(FOLD_SAMPLES) / (FOLD_SAMPLES - 1))
+    if grading.cells_alike:
+        limit = grading.surface.tube.max_thickness * grading.cell_size
+        if all(np.all(np.abs(fitted.thickness) < limit) for _, fitted in offset_patches(complex, grading, nodes)):
+            return
     middles, halves, found = [], [], []
     for some, fitted in offset_patches(complex, grading, nodes):
         shape = (-1, FOLD_SAMPLES, FOLD_SAMPLES)

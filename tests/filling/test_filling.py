@@ -248,6 +248,8 @@ def test_a_skin_is_kept_and_fused_with_what_fills_the_core() -> None:
     core = cq.Workplane(origin=(5.0, 4.0, 4.3 + skin)).circle(inner).extrude(HEIGHT - 2 * skin)
     made, within = fill(peg(), CELL, WALL, fit=COARSE, skin=skin), fill(core, CELL, WALL, fit=COARSE)
     assert made.report.solids == 1
+    assert made.report.by_sections
+    assert made.report.shift == (0.0, 0.0, 0.0)
     assert made.report.volume == pytest.approx(
         PEG - np.pi * inner**2 * (HEIGHT - 2 * skin) + within.report.volume, rel=1e-4
     )

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert, BRepBuilderAPI_Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeSphere
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopAbs import TopAbs_FACE
 from OCP.TopExp import TopExp_Explorer
@@ -20,7 +20,8 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import Topology, enclosed_volume, is_valid, topology
+from gyroid_cad.kernel.check import Topology, enclosed_volume, is_valid, measure_about, topology
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.solid import build_solid
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
@@ -172,3 +173,15 @@ def test_validity_is_the_kernels_own_opinion() -> None:
     for shape in (solid_of(), solid_round(whole), solid_round(whole[1:])):
         assert is_valid(shape) == BRepCheck_Analyzer(shape, True, True).IsValid()
     assert is_valid(solid_of())
+
+
+@settings(max_examples=10, deadline=None)
+@given(middle=st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)), shift=st.floats(-5, 5))
+def test_fluxes_of_faces_about_any_one_place_make_up_the_volume(
+    middle: tuple[float, float, float], shift: float
+) -> None:
+    move = gp_Trsf()
+    move.SetTranslation(gp_Vec(shift, 0, 0))
+    cylinder = BRepPrimAPI_MakeCylinder(2.0, 3.0).Shape().Moved(TopLoc_Location(move))
+    found = np.array([measure_about(as_face(face), np.array(middle)) for face in faces(cylinder)])
+    assert found.sum(axis=0) == pytest.approx([12 * np.pi, 20 * np.pi], rel=1e-6)

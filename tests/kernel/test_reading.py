@@ -55,7 +55,7 @@ def test_triangles_are_told_by_the_faces_they_lie_on() -> None:
     box = bd.fillet(bd.Box(1, 2, 3).edges().filter_by(bd.Axis.Z), 0.2)
     vertices, triangles, faces = shown_triangles(box.wrapped)
     by_face = np.bincount(faces, areas(vertices, triangles))
-    assert by_face == pytest.approx([face.area for face in box.faces()], rel=2e-3)
+    assert by_face == pytest.approx([face.area for face in box.faces()], rel=5e-3)
 
 
 def test_faces_of_a_lattice_are_told_by_their_sides_also_in_a_file_and_those_of_other_things_by_none(

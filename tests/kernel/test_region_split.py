@@ -115,7 +115,7 @@ def test_the_solids_are_those_of_splitting_at_once(name: str, tmp_path: Path) ->
     assert topology(solids).closed
     assert topology(solids) == topology(others)
     assert measure(solids) == pytest.approx(measure(others), rel=1e-9)
-    write_step(solids, tmp_path / "solids.step", parameter_curves=True)
+    write_step(solids, tmp_path / "solids.step")
     back = read_step(tmp_path / "solids.step")
     assert is_valid(back)
     assert topology(back) == topology(others)

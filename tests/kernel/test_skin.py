@@ -162,7 +162,7 @@ def test_at_an_opening_the_lattice_and_what_it_leaves_come_to_the_surface() -> N
 
 def test_it_survives_a_step_file(tmp_path: Path) -> None:
     _, _, ours, _ = filled("box")
-    write_step(ours, tmp_path / "box.step", parameter_curves=True)
+    write_step(ours, tmp_path / "box.step")
     back = read_step(tmp_path / "box.step")
     assert_sound(back)
     assert topology(back) == topology(ours)

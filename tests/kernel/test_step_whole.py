@@ -52,7 +52,7 @@ def along_an_offset_curve() -> Any:
 @pytest.mark.parametrize("draw", DRAWN.values(), ids=DRAWN)
 def test_the_text_counts_what_the_kernel_does(draw: Any, tmp_path: Path) -> None:
     shape = draw()
-    write_step(shape, tmp_path / "a.step", parameter_curves=True)
+    write_step(shape, tmp_path / "a.step")
     assert topology_in_step(tmp_path / "a.step") == topology(shape)
 
 
@@ -66,7 +66,7 @@ def test_a_part_that_others_drew_is_written_whole(part: Path | None, tmp_path: P
     if part is None:
         pytest.skip("the folder of parts is not there")
     shape = read_step(part)
-    write_step(shape, tmp_path / "a.step", parameter_curves=True)
+    write_step(shape, tmp_path / "a.step")
     # Solids that stand at several places are in the text once, and all there when it is read.
     found, back, wanted = (
         topology_in_step(tmp_path / "a.step"),
@@ -87,6 +87,6 @@ def test_a_solid_that_stands_at_two_places_is_in_the_file_once(tmp_path: Path) -
 def test_a_file_whose_writer_left_faces_out_is_not_left_behind(tmp_path: Path) -> None:
     (tmp_path / "a.step").write_text("what was there")
     with pytest.raises(ExportError, match=r"of 6 faces and \d+ open edges; BREP holds"):
-        write_step(along_an_offset_curve(), tmp_path / "a.step", parameter_curves=True)
+        write_step(along_an_offset_curve(), tmp_path / "a.step")
     assert (tmp_path / "a.step").read_text() == "what was there"
     assert [file.name for file in tmp_path.iterdir()] == ["a.step"]

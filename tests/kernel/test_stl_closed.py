@@ -1,4 +1,4 @@
-"""Triangles of the kernel's mesher are looked at before they are a file: none that is open takes its name."""
+"""Triangles of trimmed solids are closed, and looked at before they are a file: none that is open takes its name."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 import trimesh
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCone, BRepPrimAPI_MakeSphere
+from OCP.TopAbs import TopAbs_FACE
 
 from gyroid_cad import ExportError, IslandsWarning, Lattice
-from gyroid_cad.kernel.stl import meshed, write_meshed_stl
+from gyroid_cad.kernel.check import compound_of, parts_of
+from gyroid_cad.kernel.stl import write_meshed_stl
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.measures import triangle_measures, unmatched_edges
+from gyroid_cad.mesh.triangles.measures import triangle_measures
 from gyroid_cad.surface.fit import FitSettings
 
 STEEP = 80.0
@@ -31,23 +33,22 @@ def solid(thin: Lattice) -> Any:
         return thin.solid()
 
 
-@pytest.mark.parametrize("name", ["thin.stl", "thin.3mf"])
-@pytest.mark.filterwarnings("ignore::gyroid_cad.IslandsWarning")
-def test_what_the_mesher_leaves_open_is_meshed_more_finely(
-    thin: Lattice, solid: Any, name: str, tmp_path: Path
+@pytest.mark.parametrize("walls", [0.5, 2.0, 10.0])
+def test_a_thin_trimmed_wall_is_closed_however_large_its_triangles_may_be(
+    thin: Lattice, solid: Any, walls: float, tmp_path: Path
 ) -> None:
-    wall = thin.wall_thickness
-    assert unmatched_edges(meshed(solid, "", wall, STEEP)[1]) > 0
-    thin.write(tmp_path / name, deviation=wall, angle=STEEP)
-    found = triangle_measures(*read_triangles(tmp_path / name))
+    """The kernel's mesher left it open at all of these."""
+    write_meshed_stl(solid, tmp_path / "thin.stl", walls * thin.wall_thickness, STEEP)
+    found = triangle_measures(*read_triangles(tmp_path / "thin.stl"))
     assert (found.open_edges, found.manifold) == (0, True)
 
 
-def test_what_stays_open_is_not_written_and_leaves_the_older_file(thin: Lattice, solid: Any, tmp_path: Path) -> None:
-    (tmp_path / "thin.stl").write_bytes(b"older")
-    with pytest.raises(ExportError, match=r"thin\.stl was not written: with deviation = 2\.13.* another deviation"):
-        write_meshed_stl(solid, tmp_path / "thin.stl", 10 * thin.wall_thickness, STEEP)
-    assert (tmp_path / "thin.stl").read_bytes() == b"older"
+def test_what_is_open_is_not_written_and_leaves_the_older_file(solid: Any, tmp_path: Path) -> None:
+    (tmp_path / "open.stl").write_bytes(b"older")
+    faces = compound_of(list(parts_of(solid, TopAbs_FACE))[1:])
+    with pytest.raises(ExportError, match=r"open\.stl was not written: with deviation = 0\.1 .*--route triangles"):
+        write_meshed_stl(faces, tmp_path / "open.stl", 0.1, STEEP)
+    assert (tmp_path / "open.stl").read_bytes() == b"older"
     assert len(list(tmp_path.iterdir())) == 1
 
 

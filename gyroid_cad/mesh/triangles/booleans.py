@@ -106,9 +106,10 @@ class Body:
         """Count of the voids that no way leads out of."""
         return len(self._shells[1])
 
-    def void_shells(self) -> list[Body]:
-        """Boundaries of voids that no way leads out of, turned inwards as they are: their volumes are below zero."""
-        return [Body(shell) for shell in self._shells[1]]
+    def shells(self) -> tuple[list[Body], list[Body]]:
+        """Boundaries from outside, and those of voids that no way leads out of, whose volumes are below zero."""
+        solid, voids = ([Body(shell) for shell in some] for some in self._shells)
+        return solid, voids
 
     def inside_out(self) -> Body:
         """The body that the same triangles bound, seen from the other side."""
@@ -144,9 +145,16 @@ class Body:
         mesh = self.manifold.to_mesh64()
         return np.repeat(np.asarray(mesh.run_original_id, dtype=np.int64), np.diff(mesh.run_index) // 3)
 
-    def simplified(self, tolerance: float) -> Body:
-        """The body with fewer triangles, no vertex moved further than a tolerance in mm."""
-        return Body(self.manifold.simplify(tolerance))
+    def tolerant(self, tolerance: float) -> Body:
+        """The body, of which and of whatever is made with it vertices may be left out that no more than a tolerance
+        in mm tells from their neighbours: those of a cut as it is made, which takes no time.
+
+        >>> cube = Body(Manifold.cube((2, 2, 2)))
+        >>> dented = cube - cube.moved(np.array([1.0, 1.0, 1.99]))
+        >>> dented.triangle_count, (cube.tolerant(0.1) - cube.moved(np.array([1.0, 1.0, 1.99]))).triangle_count
+        (20, 12)
+        """
+        return Body(self.manifold.set_tolerance(tolerance))
 
     def moved(self, shift: Floats) -> Body:
         """The body, translated by a vector in mm."""

@@ -21,6 +21,7 @@ Integers = NDArray[np.int64]
 # Lines run along no direction that a part was drawn by.
 _TURN = np.linalg.qr(np.array([[1.0, 0.31, 0.17], [-0.23, 1.0, 0.41], [0.37, -0.29, 1.0]]))[0]
 _PAIRS_AT_ONCE = 2**19
+_ROUNDING = 1e-12
 
 
 class SignedDistances:
@@ -194,14 +195,39 @@ class Windings:
         near = np.flatnonzero(met & (self._high[:, 2] >= points[:, 2].min()))
         first_row = row_of(self._low[near, 1])
         which, step = numbered_groups(row_of(self._high[near, 1]) - first_row + 1)
-        row, near = (first_row[which] + step) * width, near[which]
-        along = [np.clip(side[near, 0] - start[0], -0.25, width - 0.5) for side in (self._low, self._high)]
+        number, near = first_row[which] + step, near[which]
+        # Of a long triangle askew its box would hold many points that it is not over. Those beyond the ends of the
+        # rows lie in the first or the last of them.
+        edge = start[1] + height * np.stack([number, number + 1], axis=1)
+        edge[number == 0, 0], edge[number == rows - 1, 1] = -np.inf, np.inf
+        reach = _reaches(self._corners[self._triangles[near], :2], edge)
+        row = number * width
+        along = [np.clip(side - start[0], -0.25, width - 0.5) for side in reach]
         first = np.searchsorted(keys, row + along[0], side="left")
         count = np.maximum(np.searchsorted(keys, row + along[1], side="right") - first, 0)
         bounds = np.searchsorted(np.cumsum(count), np.arange(_PAIRS_AT_ONCE, int(count.sum()), _PAIRS_AT_ONCE))
         for some in np.split(np.arange(len(near)), bounds + 1):
             which, step = numbered_groups(count[some])
             yield near[some[which]], order[first[some[which]] + step]
+
+
+def _reaches(corners: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest first coordinates of triangles, corners (n, 3, 2), where their second ones are in rows."""
+    ends = np.roll(corners, -1, axis=1)
+    along = ends - corners
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = (rows[:, :, np.newaxis] - corners[:, np.newaxis, :, 1]) / along[:, np.newaxis, :, 1]
+    level = along[:, :, 1] == 0
+    parts[:, 0][level], parts[:, 1][level] = 0.0, 1.0
+    places = corners[:, np.newaxis, :, 0] + np.clip(parts, 0, 1) * along[:, np.newaxis, :, 0]
+    low, high = np.minimum(corners[..., 1], ends[..., 1]), np.maximum(corners[..., 1], ends[..., 1])
+    met = ((low <= rows[:, 1:]) & (high >= rows[:, :1]))[:, np.newaxis]
+    # Rounding takes nothing away.
+    slack = _ROUNDING * np.abs(corners[..., 0]).max(axis=1)
+    return (
+        np.where(met, places, np.inf).min(axis=(1, 2)) - slack,
+        np.where(met, places, -np.inf).max(axis=(1, 2)) + slack,
+    )
 
 
 def _left_of(corners: Floats, start: Integers, end: Integers, place: Floats) -> NDArray[np.bool_]:

@@ -108,15 +108,27 @@ def unmatched_edges(triangles: NDArray[np.integer]) -> int:
     >>> unmatched_edges(tetrahedron), unmatched_edges(tetrahedron[1:])
     (0, 3)
     """
-    _, _, one_way, uses = _edge_uses(np.asarray(triangles, dtype=np.int64))
+    facets = np.asarray(triangles, dtype=np.int64)
+    keys, forward = _edge_keys(facets)
+    # The way an edge is run is its key's last digit: of a closed manifold all keys follow one another in pairs.
+    both = np.sort(2 * keys + forward)
+    back, ahead = both[::2], both[1::2]
+    if len(both) % 2 == 0 and np.all(back % 2 == 0) and np.all(ahead == back + 1) and np.all(np.diff(back) > 0):
+        return 0
+    _, _, one_way, uses = _edge_uses(facets)
     return int(np.sum((uses != 2) | (one_way != 1)))
+
+
+def _edge_keys(facets: Integers) -> tuple[Integers, Booleans]:
+    """Number of the edge that begins at every corner, the same both ways, and whether it runs to a higher corner."""
+    start, end = facets.ravel(), facets[:, [1, 2, 0]].ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    return low * (int(facets.max(initial=0)) + 1) + high, start < end
 
 
 def _edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
     """Edges in an order that brings uses of one together, where each begins there, and how often it is used one way."""
-    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2)
-    forward = edges[:, 0] < edges[:, 1]
-    keys = edges.min(axis=1) * (int(facets.max(initial=0)) + 1) + edges.max(axis=1)
+    keys, forward = _edge_keys(facets)
     order = np.argsort(keys, kind="stable")
     first = np.flatnonzero(np.diff(keys[order], prepend=-1))
     one_way, uses = np.add.reduceat(forward[order].astype(np.int64), first), np.diff(np.append(first, len(order)))

@@ -17,7 +17,7 @@ from gyroid_cad.mesh.triangles.templates import (
     face_template,
     wall_template,
 )
-from gyroid_cad.nurbs.basis import images, rational_basis
+from gyroid_cad.nurbs.basis import component_images, rational_basis
 from gyroid_cad.nurbs.surface import edge_row
 from gyroid_cad.wall.offset import Wall
 
@@ -180,22 +180,17 @@ def _sampled(template: Template, weights: Floats, knots: tuple[Floats, Floats]) 
 
 
 def _deviations(chords: Floats, rates: Floats, controls: Floats) -> Floats:
-    normals = cross(_components(rates[0], controls), _components(rates[1], controls))
-    along = np.abs(np.sum(_components(chords, controls) * normals, axis=0))
+    normals = cross(component_images(rates[0], controls), component_images(rates[1], controls))
+    along = np.abs(np.sum(component_images(chords, controls) * normals, axis=0))
     return np.asarray(np.max(along / np.sqrt(np.sum(normals**2, axis=0)), axis=1))
 
 
 def _sums(template: Template, nodes: Floats, controls: Floats) -> Floats:
     """Sums over the triangles of surfaces of det(a, b, c) / 6 and of the vectors of area; shape (surfaces, 4)."""
-    points = _components(nodes, controls)
+    points = component_images(nodes, controls)
     a, b, c = (points[:, :, template.triangles[:, k]] for k in range(3))
     twice = cross(b - a, c - a)
     return np.column_stack([np.sum(a * twice, axis=(0, 2)) / 6, twice.sum(axis=2).T / 2])
-
-
-def _components(matrix: Floats, controls: Floats) -> Floats:
-    """Products with the control points; components first, then surfaces and places."""
-    return np.ascontiguousarray(np.moveaxis(images(matrix, controls), -1, 0))
 
 
 def _shifted(sums: Floats, shifts: Floats) -> float:

@@ -18,6 +18,8 @@ __all__ = [
     "FEWEST_STEPS",
     "Template",
     "face_template",
+    "few_counts",
+    "grid_triangles",
     "wall_template",
 ]
 
@@ -27,6 +29,8 @@ Integers = NDArray[np.int64]
 # One place at least lies inside a patch: what the strips along its edges are stitched to.
 FEWEST_STEPS = 2
 _REMEMBERED = 256
+# Where counts are more than these they are rounded up to three binary digits, so that few templates are needed.
+_FEW_COUNTS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +77,7 @@ def face_template(steps: int, edge_steps: tuple[int, int, int, int]) -> Template
     ]
     grid = np.stack(np.meshgrid(inner, inner, indexing="ij"), axis=-1).reshape(-1, 2)
     numbers = np.arange(len(grid)).reshape(steps - 1, steps - 1) + 4 + sum(edge_steps) - 4
-    triangles = [_grid_triangles(numbers)]
+    triangles = [grid_triangles(numbers)]
     first = 4
     rims = (numbers[:, 0], numbers[-1, :], numbers[::-1, -1], numbers[0, ::-1])
     for k, count in enumerate(edge_steps):
@@ -88,7 +92,21 @@ def wall_template(along: int, across: int) -> Template:
     """Triangles of a side wall: u from -1 to 1 along its edge, v from 0 to 1 through the wall."""
     u, v = np.linspace(-1, 1, along + 1), np.linspace(0, 1, across + 1)
     places = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
-    return _template(places, _grid_triangles(np.arange(len(places)).reshape(along + 1, across + 1)))
+    return _template(places, grid_triangles(np.arange(len(places)).reshape(along + 1, across + 1)))
+
+
+def few_counts(steps: Integers) -> Integers:
+    """Steps as they are where few numbers occur, else rounded up to three binary digits.
+
+    Examples
+    --------
+    >>> few_counts(np.array([2, 3, 9])).tolist(), few_counts(np.arange(6, 12)).tolist()
+    ([2, 3, 9], [6, 7, 8, 10, 10, 12])
+    """
+    if len(np.unique(steps)) <= _FEW_COUNTS:
+        return steps
+    unit = 2 ** np.maximum(0, np.floor(np.log2(steps)).astype(np.int64) - 2)
+    return np.asarray(-(-steps // unit) * unit)
 
 
 def _template(places: Floats, triangles: Integers) -> Template:
@@ -96,8 +114,14 @@ def _template(places: Floats, triangles: Integers) -> Template:
     return Template(places, triangles, np.unique(ends, axis=0))
 
 
-def _grid_triangles(numbers: Integers) -> Integers:
-    """Two triangles for each square of a grid of numbers."""
+def grid_triangles(numbers: Integers) -> Integers:
+    """Two triangles for each square of a grid of numbers.
+
+    Examples
+    --------
+    >>> grid_triangles(np.arange(4).reshape(2, 2)).tolist()
+    [[0, 2, 3], [0, 3, 1]]
+    """
     a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]))
     return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.triangles.measuring import face_cases, face_deviations, side_deviations, triangulated_volume
-from gyroid_cad.mesh.triangles.templates import FEWEST_STEPS, Template, wall_template
+from gyroid_cad.mesh.triangles.templates import FEWEST_STEPS, Template, few_counts, wall_template
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["Subdivision", "Triangulation", "parting", "subdivided", "triangulated"]
@@ -29,8 +29,6 @@ _FIRST_STEPS = 8
 MOST_STEPS = 128
 # Between the deviation that would just do and the one named as possible: corners are offset, counts rounded up.
 _SLACK = 1.5
-# Where counts are more than these they are rounded up to three binary digits, so that few templates are needed.
-_FEW_COUNTS = 4
 # Of a side wall's deviation, what its curved edges may take; its twist takes the rest.
 _SHARE_OF_EDGES = 0.5
 # Counts come from floating-point roots: a whole number that came out a hair above itself is still that number.
@@ -80,18 +78,18 @@ def subdivided(wall: Wall, deviation: float, reserved: float = 0.0) -> Subdivisi
     limit = (deviation - reserved) / _MARGIN
     distinct = np.arange(len(wall.nets))
     first = np.column_stack([np.full((len(distinct), 5), _FIRST_STEPS), distinct])
-    patch_steps = _rounded(_enough(first[:, 0], face_deviations(wall, first), limit))[wall.patch_net]
+    patch_steps = few_counts(_enough(first[:, 0], face_deviations(wall, first), limit))[wall.patch_net]
     free = np.flatnonzero(wall.complex.free)
     while True:
         _require_few(patch_steps, deviation)
         edge_steps = _steps_of_edges(wall, patch_steps)
-        edge_steps[free] = _rounded(_steps_of_side_walls(wall, free, edge_steps[free], limit))
+        edge_steps[free] = few_counts(_steps_of_side_walls(wall, free, edge_steps[free], limit))
         _require_few(edge_steps, deviation)
         cases, which = face_cases(wall, patch_steps, edge_steps)
         faces = face_deviations(wall, cases)
         if faces.max() <= limit:
             break
-        patch_steps = _rounded(np.maximum(patch_steps, _enough(cases[:, 0], faces, limit)[which]))
+        patch_steps = few_counts(np.maximum(patch_steps, _enough(cases[:, 0], faces, limit)[which]))
     across, sides = _through(wall, free, edge_steps[free], limit)
     return Subdivision(patch_steps, edge_steps, across, max(float(faces.max()), sides))
 
@@ -101,14 +99,6 @@ def _enough(steps: Integers, deviation: Floats, limit: float) -> Integers:
     more = np.ceil(steps * np.sqrt(deviation / limit) * (1 - _HAIR)).astype(np.int64)
     # Where they do not do yet, one more at least.
     return np.asarray(np.maximum(np.where(deviation > limit, np.maximum(more, steps + 1), more), FEWEST_STEPS))
-
-
-def _rounded(steps: Integers) -> Integers:
-    """As they are where few numbers occur, else rounded up to three binary digits."""
-    if len(np.unique(steps)) <= _FEW_COUNTS:
-        return steps
-    unit = 2 ** np.maximum(0, np.floor(np.log2(steps)).astype(np.int64) - 2)
-    return np.asarray(-(-steps // unit) * unit)
 
 
 def _require_few(steps: Integers, deviation: float) -> None:

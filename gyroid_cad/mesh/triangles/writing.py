@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.files import replacing
-from gyroid_cad.common.formats import OBJ, PLY, STL, THREE_MF, TRIANGLE_FORMATS, require_format
+from gyroid_cad.common.formats import OBJ, PLY, STL, THREE_MF, TRIANGLE_FORMATS, Format, require_format
 from gyroid_cad.errors import ExportError
-from gyroid_cad.mesh.triangles.files import STL_RECORD, read_triangles, renumbered
+from gyroid_cad.mesh.triangles.files import STL_RECORD, binary_stl_corners, read_triangles, renumbered
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import STL_HEADER
 
@@ -122,11 +122,20 @@ def write_triangles(
     writer = {STL: _write_stl, OBJ: _write_obj, PLY: _write_ply}[form]
     with replacing(path) as temporary:
         writer(np.asarray(vertices), np.asarray(triangles), temporary)
-        _, numbers = read_triangles(temporary, form)
+        numbers = _read_back(temporary, form, vertices, triangles)
         if open_edges := unmatched_edges(numbers):
             raise ExportError(
                 f"{path} was not written: read back it has {open_edges} edges that two triangles do not share"
             )
+
+
+def _read_back(path: Path, form: Format, vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> Integers:
+    """Triangles of a file by the numbers of their corners, one where their coordinates are the same."""
+    singles, numbers = np.asarray(vertices, dtype=np.float32), np.asarray(triangles, dtype=np.int64)
+    if form is STL and np.array_equal(binary_stl_corners(path), singles[numbers]):
+        # So there is no need to find again which of the corners are one vertex.
+        return renumbered(singles, numbers)[1]
+    return read_triangles(path, form)[1]
 
 
 def _write_stl(vertices: NDArray[np.floating], triangles: NDArray[np.integer], path: Path) -> None:

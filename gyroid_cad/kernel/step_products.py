@@ -1,0 +1,312 @@
+"""Header, products, units, assembly and colours of a STEP file: all that is round its solids."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from OCP.TopAbs import TopAbs_FORWARD, TopAbs_SOLID
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Shape
+
+from gyroid_cad.common.choices import Schema
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes
+from gyroid_cad.kernel.step_geometry import AxisPlacement, axis_placement
+from gyroid_cad.kernel.step_solids import LEAST_GAP, StepSolid, read_solids, require_solids
+from gyroid_cad.kernel.step_text import StepText, quoted, real, refs
+from gyroid_cad.version import __version__
+
+__all__ = ["Occurrence", "ShapeSize", "StepPart", "products_of", "time_stamp", "write_products"]
+
+_HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+# Of a schema: name and version, and of its application: name, year and purpose.
+_SCHEMAS: Mapping[Schema, tuple[str, str, int, str]] = {
+    "ap214": (
+        "AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }",
+        "automotive_design",
+        2000,
+        "core data for automotive mechanical design processes",
+    ),
+    "ap242": (
+        "AP242_MANAGED_MODEL_BASED_3D_ENGINEERING_MIM_LF {1 0 10303 442 1 1 4 }",
+        "ap242_managed_model_based_3d_engineering",
+        2013,
+        "Managed model based 3d engineering",
+    ),
+}
+_LINES = 0.1
+# Of a property that receivers compare with what they find (recommended practices of the CAx Implementor Forum for
+# geometric validation properties): its name, that of its item, its measure, and the power of the millimetre.
+_VALIDATED = (("volume", "volume measure", "VOLUME", 3), ("surface area", "surface area measure", "AREA", 2))
+# Of its value: far more than any receiver compares.
+_DIGITS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSize:
+    """Size of a shape, by quadrature.
+
+    Attributes
+    ----------
+    volume, area : float
+        In mm3 and mm2, of all its solids.
+    """
+
+    volume: float
+    area: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepPart:
+    """A part of one or several solids.
+
+    Attributes
+    ----------
+    name : str
+    solids : sequence of StepSolid
+    colour : str
+        By which STEP knows it; that of the file's reader if left out.
+    face_names, face_colours : sequence of str
+        One a face, as the kernel counts them, or none.
+    size : ShapeSize, optional
+    """
+
+    name: str
+    solids: Sequence[StepSolid]
+    colour: str = ""
+    face_names: Sequence[str] = ()
+    face_colours: Sequence[str] = ()
+    size: ShapeSize | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Occurrence:
+    """A place where an assembly has a part.
+
+    Attributes
+    ----------
+    part : int
+    name : str
+    frame : AxisPlacement
+    """
+
+    part: int
+    name: str
+    frame: AxisPlacement
+
+
+def write_products(
+    path: Path,
+    name: str,
+    parts: Sequence[StepPart],
+    occurrences: Sequence[Occurrence] = (),
+    schema: Schema = "ap214",
+    size: ShapeSize | None = None,
+) -> None:
+    """Write a file of parts.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        Of the product; of the assembly, if there are occurrences.
+    parts : sequence of StepPart
+        One, if there are no occurrences.
+    occurrences : sequence of Occurrence
+    schema : {"ap214", "ap242"}
+    size : ShapeSize, optional
+        Of all of it, for receivers to compare what they find with.
+    """
+    extent = max(solid.extent for part in parts for solid in part.solids)
+    with path.open("w", encoding="ascii", newline="\n") as out:
+        out.write(_header(name, schema))
+        text = StepText(out, extent)
+        products = _Products(text, schema)
+        whole = products.assembly(name, parts, occurrences) if occurrences else products.part(parts[0], name)
+        if size is not None:
+            products.validate(whole, size)
+        out.write("ENDSEC;\nEND-ISO-10303-21;\n")
+
+
+def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Occurrence]]:
+    """Return the parts that a shape is written as, and their places if it has a solid in several.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    name : str
+        Of the product.
+
+    Raises
+    ------
+    UnknownGeometryError
+    """
+    kinds, solids = NumberedShapes(), list(parts_of(shape, TopAbs_SOLID))
+    which = [kinds.Add(solid.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for solid in solids]
+    if len(solids) == kinds.Extent():
+        return [StepPart(name, read_solids(shape))], []
+    require_solids(shape)
+    parts = [StepPart(f"{name} {kind}", read_solids(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
+    places = [axis_placement(solid.Location()) for solid in solids]
+    return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
+
+
+def time_stamp() -> str:
+    """The time that a file bears: now, or that of ``SOURCE_DATE_EPOCH``, the convention for reproducible builds."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = datetime.fromtimestamp(int(epoch), UTC) if epoch.isdigit() else datetime.now()
+    return moment.strftime("%Y-%m-%dT%H:%M:%S")
+
+
+def _header(name: str, schema: Schema) -> str:
+    program = f"gyroid_cad {__version__}"
+    return (
+        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('gyroid lattice'),'2;1');\n"
+        f"FILE_NAME({quoted(name)},'{time_stamp()}',(''),(''),'{program}','{program}','');\n"
+        f"FILE_SCHEMA(('{_SCHEMAS[schema][0]}'));\nENDSEC;\nDATA;\n"
+    )
+
+
+@dataclass(slots=True)
+class _Product:
+    """Numbers of a product's entities."""
+
+    definition: int
+    shape: int
+    representation: int = 0
+    context: int = 0
+    styled: list[int] = field(default_factory=list)
+
+
+class _Products:
+    def __init__(self, text: StepText, schema: Schema) -> None:
+        self.text = text
+        _, application, year, purpose = _SCHEMAS[schema]
+        self._application = text.add(f"APPLICATION_CONTEXT('{purpose}')")
+        text.add(
+            f"APPLICATION_PROTOCOL_DEFINITION('international standard','{application}',{year},#{self._application})"
+        )
+
+    def assembly(self, name: str, parts: Sequence[StepPart], occurrences: Sequence[Occurrence]) -> _Product:
+        assembly = self._product(name)
+        places = [self.text.frame(*one.frame) for one in occurrences]
+        assembly.context = self._context(max(solid.gap for part in parts for solid in part.solids))
+        items = refs(dict.fromkeys([self.text.frame(*_HOME), *places]))
+        assembly.representation = self.text.add(f"SHAPE_REPRESENTATION('',{items},#{assembly.context})")
+        self._define(assembly)
+        made = [self.part(part, part.name) for part in parts]
+        for number, (one, place) in enumerate(zip(occurrences, places, strict=True), 1):
+            self._occurrence(number, one.name, place, assembly, made[one.part])
+        return assembly
+
+    def _product(self, name: str) -> _Product:
+        add = self.text.add
+        context = self.text.once(f"PRODUCT_CONTEXT('',#{self._application},'mechanical')")
+        product = add(f"PRODUCT({quoted(name)},{quoted(name)},'',(#{context}))")
+        add(f"PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,(#{product}))")
+        formation = add(f"PRODUCT_DEFINITION_FORMATION('','',#{product})")
+        design = self.text.once(f"PRODUCT_DEFINITION_CONTEXT('part definition',#{self._application},'design')")
+        definition = add(f"PRODUCT_DEFINITION('design','',#{formation},#{design})")
+        return _Product(definition, add(f"PRODUCT_DEFINITION_SHAPE('','',#{definition})"))
+
+    def part(self, part: StepPart, name: str) -> _Product:
+        product = self._product(name)
+        names = iter(part.face_names)
+        numbers = [solid.write(self.text, names) for solid in part.solids]
+        product.context = self._context(max(solid.gap for solid in part.solids))
+        items = refs([self.text.frame(*_HOME), *(solid for solid, _ in numbers)])
+        product.representation = self.text.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},#{product.context})")
+        self._define(product)
+        if part.colour:
+            self._colour(part, numbers, product.context)
+        if part.size is not None:
+            self.validate(product, part.size)
+        return product
+
+    def validate(self, product: _Product, size: ShapeSize) -> None:
+        """Say how large a product is."""
+        add, once = self.text.add, self.text.once
+        for name, item, measure, power in _VALIDATED:
+            value = real(float(f"{size.area if power == 2 else size.volume:.{_DIGITS}g}"))
+            unit = once(f"DERIVED_UNIT({refs([once(f'DERIVED_UNIT_ELEMENT(#{self._millimetre()},{power}.)')])})")
+            measured = add(f"MEASURE_REPRESENTATION_ITEM('{item}',{measure}_MEASURE({value}),#{unit})")
+            representation = add(f"REPRESENTATION('{name}',(#{measured}),#{product.context})")
+            defined = add(f"PROPERTY_DEFINITION('geometric validation property','{name}',#{product.shape})")
+            add(f"PROPERTY_DEFINITION_REPRESENTATION(#{defined},#{representation})")
+
+    def _define(self, product: _Product) -> None:
+        self.text.add(f"SHAPE_DEFINITION_REPRESENTATION(#{product.shape},#{product.representation})")
+
+    def _context(self, gap: float) -> int:
+        """Units, and how far apart may be what belongs together."""
+        once = self.text.once
+        length = self._millimetre()
+        angle = once("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
+        solid_angle = once("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
+        distance = real(_rounded_up(max(gap, LEAST_GAP)))
+        uncertainty = once(
+            f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({distance}),#{length},"
+            "'distance_accuracy_value','confusion accuracy')"
+        )
+        return self.text.add(
+            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)"
+            f"GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#{uncertainty}))"
+            f"GLOBAL_UNIT_ASSIGNED_CONTEXT({refs((length, angle, solid_angle))})"
+            "REPRESENTATION_CONTEXT('','3D'))"
+        )
+
+    def _millimetre(self) -> int:
+        return self.text.once("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
+
+    def _occurrence(self, number: int, name: str, place: int, assembly: _Product, part: _Product) -> None:
+        add = self.text.add
+        usage = add(
+            f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}',{quoted(name)},'',#{assembly.definition},#{part.definition},$)"
+        )
+        shape = add(f"PRODUCT_DEFINITION_SHAPE('Placement','Placement of an item',#{usage})")
+        move = add(f"ITEM_DEFINED_TRANSFORMATION('','',#{self.text.frame(*_HOME)},#{place})")
+        relation = add(
+            f"(REPRESENTATION_RELATIONSHIP('','',#{part.representation},#{assembly.representation})"
+            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{move})SHAPE_REPRESENTATION_RELATIONSHIP())"
+        )
+        add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
+
+    def _colour(self, part: StepPart, numbers: list[tuple[int, list[int]]], context: int) -> None:
+        whole = self._style(part.colour, with_lines=True)
+        colours, styled = iter(part.face_colours), []
+        for solid, faces in numbers:
+            of_solid = self.text.add(f"STYLED_ITEM('color',(#{whole}),#{solid})")
+            others = ((face, colour) for face, colour in zip(faces, colours, strict=False) if colour != part.colour)
+            styled += [
+                of_solid,
+                *self.text.add_all(
+                    f"OVER_RIDING_STYLED_ITEM('overriding color',(#{self._style(colour)}),#{face},#{of_solid})"
+                    for face, colour in others
+                ),
+            ]
+        self.text.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',{refs(styled)},#{context})")
+
+    def _style(self, colour: str, with_lines: bool = False) -> int:
+        once = self.text.once
+        known = once(f"DRAUGHTING_PRE_DEFINED_COLOUR('{colour}')")
+        paint = once(f"FILL_AREA_STYLE_COLOUR('',#{known})")
+        fill = once(f"FILL_AREA_STYLE('',(#{paint}))")
+        area = once(f"SURFACE_STYLE_FILL_AREA(#{fill})")
+        side = once(f"SURFACE_SIDE_STYLE('',(#{area}))")
+        styles = [once(f"SURFACE_STYLE_USAGE(.BOTH.,#{side})")]
+        if with_lines:
+            font = once("DRAUGHTING_PRE_DEFINED_CURVE_FONT('continuous')")
+            styles.append(once(f"CURVE_STYLE('',#{font},POSITIVE_LENGTH_MEASURE({real(_LINES)}),#{known})"))
+        return once(f"PRESENTATION_STYLE_ASSIGNMENT({refs(styles)})")
+
+
+def _rounded_up(value: float) -> float:
+    """The value to one digit, not below it."""
+    step: float = 10.0 ** math.floor(math.log10(value))
+    # A value that is a step itself, but for rounding, stays.
+    return float(f"{math.ceil(value / step - 1e-9) * step:.1g}")

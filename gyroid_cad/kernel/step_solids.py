@@ -1,0 +1,282 @@
+"""Solids as STEP has them: the kernel's topology walked once, and written with what faces and edges share once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.BRepClass3d import BRepClass3d
+from OCP.BRepTools import BRepTools_WireExplorer
+from OCP.Geom import Geom_SphericalSurface
+from OCP.TopAbs import (
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_FORWARD,
+    TopAbs_REVERSED,
+    TopAbs_SHELL,
+    TopAbs_SOLID,
+    TopAbs_WIRE,
+)
+from OCP.TopExp import TopExp, TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Vertex
+
+from gyroid_cad.kernel.check import parts_of
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid, as_wire
+from gyroid_cad.kernel.step_geometry import Geometries, Placed, Spline, Triple, UnknownGeometryError
+from gyroid_cad.kernel.step_text import StepText, flag, quoted, refs
+
+__all__ = ["LEAST_GAP", "StepSolid", "read_solids", "require_solids"]
+
+# In mm: the kernel's smallest distance, which no tolerance is below.
+LEAST_GAP = 1e-7
+# Along an edge, from 0 to 1: by the golden ratio, so that they are not where a curve was fitted through points.
+_SAMPLES = np.arange(1, 18) * (np.sqrt(5) - 1) / 2 % 1
+
+# Of an edge: its number, and whether it is run from its first vertex to its last.
+Use = tuple[int, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class _Loop:
+    """A border of a face: uses of edges, one after the other, or a single vertex."""
+
+    uses: list[Use]
+    vertex: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Face:
+    surface: int
+    forward: bool
+    loops: list[_Loop]
+
+
+@dataclass(slots=True)
+class StepSolid:
+    """A solid, read from the kernel.
+
+    Attributes
+    ----------
+    gap : float
+        The largest in mm, of edges from their surfaces and from their ends.
+    surfaces, curves : Geometries
+    vertices : list of tuple of float
+    edges : list of (first vertex, last vertex, curve)
+    shells : list of list of faces
+    outer : int
+        Which of them is not round a void.
+    """
+
+    gap: float = 0.0
+    surfaces: Geometries = field(default_factory=Geometries)
+    curves: Geometries = field(default_factory=Geometries)
+    vertices: list[Triple] = field(default_factory=list)
+    edges: list[tuple[int, int, int]] = field(default_factory=list)
+    shells: list[list[_Face]] = field(default_factory=list)
+    outer: int = 0
+
+    @property
+    def extent(self) -> float:
+        """The largest coordinate of its vertices and splines, in mm."""
+        splines = [one for some in (self.surfaces, self.curves) for one in some.found if isinstance(one, Spline)]
+        places = [np.array(self.vertices), *(one.poles for one in splines)]
+        return max(float(np.abs(some).max()) for some in places)
+
+    def write(self, text: StepText, face_names: Iterator[str]) -> tuple[int, list[int]]:
+        """Write the solid.
+
+        Parameters
+        ----------
+        text : StepText
+        face_names : iterator of str
+            One a face, as the kernel counts them, or none.
+
+        Returns
+        -------
+        solid : int
+            Number of its entity.
+        faces : list of int
+            Numbers of its faces, as the kernel counts them.
+        """
+        geometries = text.geometries([*self.surfaces.found, *self.curves.found])
+        curves = geometries[len(self.surfaces.found) :]
+        points = text.points(np.array(self.vertices).reshape(-1, 3), shared=False)
+        vertices = text.add_all(f"VERTEX_POINT('',#{point})" for point in points)
+        edges = text.add_all(
+            f"EDGE_CURVE('',#{vertices[first]},#{vertices[last]},#{curves[curve]},.T.)"
+            for first, last, curve in self.edges
+        )
+        shells, faces = [], []
+        for shell in self.shells:
+            numbers = []
+            for face in shell:
+                bounds = [self._bound(text, loop, vertices, edges, face.forward) for loop in face.loops]
+                surface = self.surfaces.found[face.surface]
+                # The entity's normal is the opposite of the kernel's there.
+                turned = isinstance(surface, Placed) and surface.left_handed
+                rest = f"{refs(bounds)},#{geometries[face.surface]},{flag(face.forward != turned)}"
+                numbers.append(text.add(f"ADVANCED_FACE({quoted(next(face_names, ''))},{rest})"))
+            shells.append(text.add(f"CLOSED_SHELL('',{refs(numbers)})"))
+            faces += numbers
+        outer = shells.pop(self.outer)
+        if not shells:
+            return text.add(f"MANIFOLD_SOLID_BREP('',#{outer})"), faces
+        voids = text.add_all(f"ORIENTED_CLOSED_SHELL('',*,#{shell},.F.)" for shell in shells)
+        return text.add(f"BREP_WITH_VOIDS('',#{outer},{refs(voids)})"), faces
+
+    def _bound(self, text: StepText, loop: _Loop, vertices: range, edges: range, forward: bool) -> int:
+        if loop.vertex is not None:
+            border = text.add(f"VERTEX_LOOP('',#{vertices[loop.vertex]})")
+        else:
+            uses = text.add_all(f"ORIENTED_EDGE('',*,*,#{edges[edge]},{flag(along)})" for edge, along in loop.uses)
+            border = text.add(f"EDGE_LOOP('',{refs(uses)})")
+        return text.add(f"FACE_BOUND('',#{border},{flag(forward)})")
+
+
+def read_solids(shape: TopoDS_Shape) -> list[StepSolid]:
+    """Read the solids of a shape, each with edges and vertices of its own.
+
+    Raises
+    ------
+    UnknownGeometryError
+        If it holds anything that is not known here.
+    """
+    require_solids(shape)
+    return [_Reading(solid).read for solid in parts_of(shape, TopAbs_SOLID)]
+
+
+def require_solids(shape: TopoDS_Shape) -> None:
+    """Check that a shape is solids and nothing else.
+
+    Raises
+    ------
+    UnknownGeometryError
+    """
+    strays = (TopExp_Explorer(shape, TopAbs_FACE, TopAbs_SOLID), TopExp_Explorer(shape, TopAbs_EDGE, TopAbs_FACE))
+    if not TopExp_Explorer(shape, TopAbs_SOLID).More() or any(explorer.More() for explorer in strays):
+        raise UnknownGeometryError("faces or edges of no solid")
+
+
+class _Reading:
+    """The walk through a solid."""
+
+    def __init__(self, solid: TopoDS_Shape) -> None:
+        self.read = StepSolid()
+        self._edges, self._vertices = NumberedShapes(), NumberedShapes()
+        self._meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]] = []
+        # A solid is what its outer shell holds; that the kernel has it inside out is not for STEP to say.
+        whole = solid.Oriented(TopAbs_FORWARD)
+        shells = _children(whole)
+        if any(shell.ShapeType() != TopAbs_SHELL for shell in shells):
+            raise UnknownGeometryError("a solid with more than shells")
+        if len(shells) > 1:
+            outer = BRepClass3d.OuterShell_s(as_solid(whole))
+            self.read.outer = next(number for number, shell in enumerate(shells) if shell.IsSame(outer))
+        for number, shell in enumerate(shells):
+            # The shell of a void is written as seen from the void.
+            turned = number != self.read.outer
+            self.read.shells.append([self._face(as_face(face), turned) for face in _children(shell)])
+        self.read.gap = _largest_gap(self._meetings)
+
+    def _face(self, face: TopoDS_Face, turned: bool) -> _Face:
+        location = TopLoc_Location()
+        geometry = BRep_Tool.Surface_s(face, location)
+        surface = self.read.surfaces.number(geometry, location)
+        wires = _children(face.Oriented(TopAbs_FORWARD))
+        on_ball = isinstance(geometry, Geom_SphericalSurface)
+        if not wires:
+            raise UnknownGeometryError("a face without a border")
+        loops = [self._loop(wire, face, on_ball) for wire in wires]
+        return _Face(surface, (_along(face) != turned), loops)
+
+    def _loop(self, wire: TopoDS_Shape, face: TopoDS_Face, on_ball: bool) -> _Loop:
+        if wire.ShapeType() != TopAbs_WIRE:
+            raise UnknownGeometryError("a face with more than wires")
+        edges = [as_edge(edge) for edge in _children(wire)]
+        uses = [self._use(edge, face) for edge in edges if not BRep_Tool.Degenerated_s(edge)]
+        # The whole of a ball has no border: its seam, and its poles, are the kernel's own affair.
+        whole_ball = on_ball and len(edges) == 4 and len(uses) == 2 and uses[0][0] == uses[1][0]
+        if whole_ball or not uses:
+            pole = next(edge for edge in edges if BRep_Tool.Degenerated_s(edge))
+            return _Loop([], self._vertex(TopExp.FirstVertex_s(pole)))
+        for some in (uses, uses[::-1]):
+            if self._joined(some):
+                return _Loop(some)
+        explorer, ordered = BRepTools_WireExplorer(as_wire(wire), as_face(face.Oriented(TopAbs_FORWARD))), []
+        while explorer.More():
+            if not BRep_Tool.Degenerated_s(explorer.Current()):
+                ordered.append(self._use(explorer.Current(), face))
+            explorer.Next()
+        if sorted(ordered) != sorted(uses) or not self._joined(ordered):
+            raise UnknownGeometryError("a wire that does not close")
+        return _Loop(ordered)
+
+    def _joined(self, uses: list[Use]) -> bool:
+        """Tell whether every edge ends where the next begins."""
+        ends = [self.read.edges[edge][:2] if along else self.read.edges[edge][1::-1] for edge, along in uses]
+        return all(end == start for (_, end), (start, _) in zip(ends, [*ends[1:], ends[0]], strict=True))
+
+    def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:
+        along, known = _along(edge), self._edges.Extent()
+        number = int(self._edges.Add(edge))
+        self._meetings.append((BRep_Tool.Tolerance_s(edge), edge, face))
+        if number > known:
+            forward = as_edge(edge.Oriented(TopAbs_FORWARD))
+            location = TopLoc_Location()
+            curve = self.read.curves.number(BRep_Tool.Curve_s(forward, location, 0.0, 0.0), location)
+            ends = TopExp.FirstVertex_s(forward), TopExp.LastVertex_s(forward)
+            self.read.edges.append((self._vertex(ends[0]), self._vertex(ends[1]), curve))
+            self._meetings += [(BRep_Tool.Tolerance_s(end), edge, end) for end in ends]
+        return number - 1, along
+
+    def _vertex(self, vertex: TopoDS_Vertex) -> int:
+        if vertex.IsNull():
+            raise UnknownGeometryError("an edge without an end")
+        known = self._vertices.Extent()
+        number = int(self._vertices.Add(vertex))
+        if number > known:
+            place = BRep_Tool.Pnt_s(vertex)
+            self.read.vertices.append((place.X(), place.Y(), place.Z()))
+        return number - 1
+
+
+def _largest_gap(meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]]) -> float:
+    """Largest distance in mm of edges from the faces that they bound and the vertices where they end.
+
+    Parameters
+    ----------
+    meetings : list of (tolerance, edge, face or vertex)
+        No distance is above its tolerance, so that those with the largest tolerances are measured, and few others.
+    """
+    largest = 0.0
+    for tolerance, edge, other in sorted(meetings, key=lambda meeting: -meeting[0]):
+        if tolerance <= max(largest, LEAST_GAP):
+            break
+        curve = BRepAdaptor_Curve(edge)
+        first, last = curve.FirstParameter(), curve.LastParameter()
+        if isinstance(other, TopoDS_Face):
+            on_face = BRepAdaptor_Curve(edge, other)
+            places = (first + (last - first) * _SAMPLES).tolist()
+            largest = max(largest, *(curve.Value(at).Distance(on_face.Value(at)) for at in places))
+        else:
+            # Of a closed edge both ends are there.
+            largest = max(largest, min(curve.Value(at).Distance(BRep_Tool.Pnt_s(other)) for at in (first, last)))
+    return largest
+
+
+def _children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    iterator, found = TopoDS_Iterator(shape), []
+    while iterator.More():
+        found.append(iterator.Value())
+        iterator.Next()
+    return found
+
+
+def _along(shape: TopoDS_Shape) -> bool:
+    if shape.Orientation() not in (TopAbs_FORWARD, TopAbs_REVERSED):
+        raise UnknownGeometryError("an edge or face inside another")
+    return bool(shape.Orientation() == TopAbs_FORWARD)

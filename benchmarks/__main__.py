@@ -25,6 +25,7 @@ from benchmarks import (
     solid_against_thickening,
     startup,
     triangles,
+    trimmed,
 )
 from benchmarks.timing import arguments_for
 
@@ -45,6 +46,7 @@ BENCHMARKS = (
     memory,
     skins,
     triangles,
+    trimmed,
     commands,
 )
 

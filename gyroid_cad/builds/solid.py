@@ -21,6 +21,7 @@ from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import compound_of, enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.solid import KernelShape, another_handle, build_solid
 from gyroid_cad.kernel.step import write_step
+from gyroid_cad.kernel.step_products import ShapeSize
 from gyroid_cad.kernel.stl import closed_triangles, write_meshed_stl
 from gyroid_cad.kernel.trimmed import build_trimmed
 from gyroid_cad.mesh.triangles.writing import write_triangles
@@ -162,7 +163,7 @@ class Build:
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                write_shape(self._shape, path, schema, deviation, angle)
+                write_shape(self._shape, ShapeSize(self.volume, self.area()), path, schema, deviation, angle)
 
     def _require_memory(self, bytes_per_cell: int) -> None:
         require_memory(self.cells, bytes_per_cell, len(self.fitted.wall.weights))
@@ -180,8 +181,10 @@ class Build:
             )
 
 
-def write_shape(shape: KernelShape, path: Path, schema: Schema, deviation: float, angle: float) -> None:
-    """Write a shape in the format of the path's ending.
+def write_shape(
+    shape: KernelShape, size: ShapeSize, path: Path, schema: Schema, deviation: float, angle: float
+) -> None:
+    """Write a shape, whose size is known, in the format of the path's ending.
 
     Raises
     ------
@@ -190,7 +193,7 @@ def write_shape(shape: KernelShape, path: Path, schema: Schema, deviation: float
 
     form = format_of(path)
     if form is STEP:
-        write_step(shape, path, schema)
+        write_step(shape, path, schema, size=size)
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:

@@ -35,6 +35,7 @@ from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
+from gyroid_cad.kernel.step_products import ShapeSize
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
@@ -167,9 +168,10 @@ class Filled(HostShapes):
             if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
+        size = ShapeSize(self.report.volume, self.report.area)
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), path, schema, limit, angle)
+                write_shape(self.solid(), size, path, schema, limit, angle)
 
 
 def fill(

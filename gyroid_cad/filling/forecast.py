@@ -24,7 +24,7 @@ _START, _PER_CROSSING, _PER_FACE = 2.0, 0.012, 0.0015
 # Peak memory for each cell of the box round triangles that are filled.
 _BYTES_PER_CELL = 10_000_000
 # Peak memory of filling and writing, for each face, as measured, rounded up; and a face in a STEP file.
-_BYTES_PER_FACE, _STEP_BYTES_PER_FACE = 150_000, 13_000
+_BYTES_PER_FACE, _STEP_BYTES_PER_FACE = 150_000, 10_000
 
 
 @dataclass(frozen=True, slots=True)

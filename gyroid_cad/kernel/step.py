@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from threading import RLock
 from types import MappingProxyType
-from typing import TextIO
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
@@ -30,7 +31,7 @@ from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import UnknownGeometryError
-from gyroid_cad.kernel.step_products import Occurrence, StepPart, products_of, time_stamp, write_products
+from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart, products_of, time_stamp, write_products
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -43,9 +44,11 @@ __all__ = [
     "write_step",
 ]
 
-_KIND = re.compile(r"#\d+\s*=\s*(\w+)\s*\(")
-_USE = re.compile(r"#\d+\s*=\s*ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+)")
-_COUNTED = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "ADVANCED_FACE", "FACE_SURFACE")
+# Entities that count, each from its line's beginning: the kernel's writer folds lines, and has blanks.
+_COUNTED = re.compile(
+    rb"\n#\d+\s*=\s*(?:(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|ADVANCED_FACE|FACE_SURFACE)\s*\("
+    rb"|ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+))"
+)
 
 
 def topology_in_step(path: str | os.PathLike[str]) -> Topology:
@@ -54,18 +57,13 @@ def topology_in_step(path: str | os.PathLike[str]) -> Topology:
     No kernel is asked, so that what its writer left out is seen. A face is an ``ADVANCED_FACE`` (ISO 10303-511),
     and an edge is used by each ``ORIENTED_EDGE`` that names it.
     """
-    counts = dict.fromkeys(_COUNTED, 0)
-    uses: dict[str, int] = {}
-    with open(path, encoding="utf-8", errors="replace") as lines:
-        for entity in _entities(lines):
-            if use := _USE.match(entity):
-                uses[use[1]] = uses.get(use[1], 0) + 1
-            elif (kind := _KIND.match(entity)) and kind[1] in counts:
-                counts[kind[1]] += 1
+    with open(path, "rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as text:
+        found = Counter(match.group(1, 2) for match in _COUNTED.finditer(text))
+    kinds = Counter({kind: count for (kind, _), count in found.items() if kind})
     return Topology(
-        solids=counts["MANIFOLD_SOLID_BREP"] + counts["BREP_WITH_VOIDS"],
-        faces=counts["ADVANCED_FACE"] + counts["FACE_SURFACE"],
-        open_edges=sum(count != 2 for count in uses.values()),
+        solids=kinds[b"MANIFOLD_SOLID_BREP"] + kinds[b"BREP_WITH_VOIDS"],
+        faces=kinds[b"ADVANCED_FACE"] + kinds[b"FACE_SURFACE"],
+        open_edges=sum(count != 2 for (kind, _), count in found.items() if not kind),
     )
 
 
@@ -90,23 +88,16 @@ def _counted_once(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> int:
     return int(parts.Extent())
 
 
-def _entities(lines: TextIO) -> Iterator[str]:
-    """Whole entities, each with its folded lines."""
-    pending = ""
-    for line in lines:
-        pending += line
-        if line.endswith(";\n"):
-            yield pending
-            pending = ""
-    yield pending
-
-
 # A host that wrote a file in inches leaves the kernel taking all lengths of shapes for inches.
 _OF_LENGTHS: Mapping[str, str | int] = MappingProxyType({"xstep.cascade.unit": "MM"})
 
 
 def write_step(
-    shape: TopoDS_Shape, path: str | os.PathLike[str], schema: Schema = "ap214", name: str | None = None
+    shape: TopoDS_Shape,
+    path: str | os.PathLike[str],
+    schema: Schema = "ap214",
+    name: str | None = None,
+    size: ShapeSize | None = None,
 ) -> None:
     """Write a shape in millimetres.
 
@@ -123,6 +114,8 @@ def write_step(
     schema : {"ap214", "ap242"}
     name : str, optional
         Of the product; the file's stem if left out.
+    size : ShapeSize, optional
+        For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
 
     Raises
     ------
@@ -134,7 +127,7 @@ def write_step(
     except UnknownGeometryError:
         _write_by_kernel(shape, path, kernel_schema, product)
     else:
-        write_parts(shape, path, schema, product, parts, places)
+        write_parts(shape, path, schema, product, parts, places, size)
 
 
 def write_parts(
@@ -143,7 +136,8 @@ def write_parts(
     schema: Schema,
     product: str,
     parts: Sequence[StepPart],
-    places: Iterable[Occurrence] = (),
+    places: Sequence[Occurrence] = (),
+    size: ShapeSize | None = None,
 ) -> None:
     """Write parts that were read from a shape, and look whether the file holds it all.
 
@@ -156,15 +150,17 @@ def write_parts(
     product : str
         Name of the whole.
     parts : sequence of StepPart
-    places : iterable of Occurrence
+    places : sequence of Occurrence
         None, if there is one part.
+    size : ShapeSize, optional
+        Of all of it.
 
     Raises
     ------
     ExportError
     """
     with replacing(path) as temporary:
-        write_products(temporary, product, parts, places, schema)
+        write_products(temporary, product, parts, places, schema, size)
         _require_whole(path, temporary, shape)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,11 +17,11 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import AxisPlacement, axis_placement
-from gyroid_cad.kernel.step_solids import StepSolid, read_solids, require_solids
+from gyroid_cad.kernel.step_solids import LEAST_GAP, StepSolid, read_solids, require_solids
 from gyroid_cad.kernel.step_text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
 
-__all__ = ["Occurrence", "StepPart", "products_of", "time_stamp", "write_products"]
+__all__ = ["Occurrence", "ShapeSize", "StepPart", "products_of", "time_stamp", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -39,9 +39,26 @@ _SCHEMAS: Mapping[Schema, tuple[str, str, int, str]] = {
         "Managed model based 3d engineering",
     ),
 }
-# The kernel's smallest distance, which no tolerance is below.
-_LEAST_UNCERTAINTY = 1e-7
 _LINES = 0.1
+# Of a property that receivers compare with what they find (recommended practices of the CAx Implementor Forum for
+# geometric validation properties): its name, that of its item, its measure, and the power of the millimetre.
+_VALIDATED = (("volume", "volume measure", "VOLUME", 3), ("surface area", "surface area measure", "AREA", 2))
+# Of its value: far more than any receiver compares.
+_DIGITS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSize:
+    """Size of a shape, by quadrature.
+
+    Attributes
+    ----------
+    volume, area : float
+        In mm3 and mm2, of all its solids.
+    """
+
+    volume: float
+    area: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +73,7 @@ class StepPart:
         By which STEP knows it; that of the file's reader if left out.
     face_names, face_colours : sequence of str
         One a face, as the kernel counts them, or none.
+    size : ShapeSize, optional
     """
 
     name: str
@@ -63,6 +81,7 @@ class StepPart:
     colour: str = ""
     face_names: Sequence[str] = ()
     face_colours: Sequence[str] = ()
+    size: ShapeSize | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +101,12 @@ class Occurrence:
 
 
 def write_products(
-    path: Path, name: str, parts: Sequence[StepPart], occurrences: Iterable[Occurrence] = (), schema: Schema = "ap214"
+    path: Path,
+    name: str,
+    parts: Sequence[StepPart],
+    occurrences: Sequence[Occurrence] = (),
+    schema: Schema = "ap214",
+    size: ShapeSize | None = None,
 ) -> None:
     """Write a file of parts.
 
@@ -93,14 +117,19 @@ def write_products(
         Of the product; of the assembly, if there are occurrences.
     parts : sequence of StepPart
         One, if there are no occurrences.
-    occurrences : iterable of Occurrence
+    occurrences : sequence of Occurrence
     schema : {"ap214", "ap242"}
+    size : ShapeSize, optional
+        Of all of it, for receivers to compare what they find with.
     """
     extent = max(solid.extent for part in parts for solid in part.solids)
     with path.open("w", encoding="ascii", newline="\n") as out:
         out.write(_header(name, schema))
         text = StepText(out, extent)
-        _Products(text, schema).write(name, parts, list(occurrences))
+        products = _Products(text, schema)
+        whole = products.assembly(name, parts, occurrences) if occurrences else products.part(parts[0], name)
+        if size is not None:
+            products.validate(whole, size)
         out.write("ENDSEC;\nEND-ISO-10303-21;\n")
 
 
@@ -163,20 +192,17 @@ class _Products:
             f"APPLICATION_PROTOCOL_DEFINITION('international standard','{application}',{year},#{self._application})"
         )
 
-    def write(self, name: str, parts: Sequence[StepPart], occurrences: list[Occurrence]) -> None:
-        if not occurrences:
-            self._part(parts[0], name)
-            return
+    def assembly(self, name: str, parts: Sequence[StepPart], occurrences: Sequence[Occurrence]) -> _Product:
         assembly = self._product(name)
         places = [self.text.frame(*one.frame) for one in occurrences]
-        tolerance = max(solid.tolerance for part in parts for solid in part.solids)
-        assembly.context = self._context(tolerance)
+        assembly.context = self._context(max(solid.gap for part in parts for solid in part.solids))
         items = refs(dict.fromkeys([self.text.frame(*_HOME), *places]))
         assembly.representation = self.text.add(f"SHAPE_REPRESENTATION('',{items},#{assembly.context})")
         self._define(assembly)
-        made = [self._part(part, part.name) for part in parts]
+        made = [self.part(part, part.name) for part in parts]
         for number, (one, place) in enumerate(zip(occurrences, places, strict=True), 1):
             self._occurrence(number, one.name, place, assembly, made[one.part])
+        return assembly
 
     def _product(self, name: str) -> _Product:
         add = self.text.add
@@ -188,28 +214,41 @@ class _Products:
         definition = add(f"PRODUCT_DEFINITION('design','',#{formation},#{design})")
         return _Product(definition, add(f"PRODUCT_DEFINITION_SHAPE('','',#{definition})"))
 
-    def _part(self, part: StepPart, name: str) -> _Product:
+    def part(self, part: StepPart, name: str) -> _Product:
         product = self._product(name)
         names = iter(part.face_names)
         numbers = [solid.write(self.text, names) for solid in part.solids]
-        product.context = self._context(max(solid.tolerance for solid in part.solids))
+        product.context = self._context(max(solid.gap for solid in part.solids))
         items = refs([self.text.frame(*_HOME), *(solid for solid, _ in numbers)])
         product.representation = self.text.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},#{product.context})")
         self._define(product)
         if part.colour:
             self._colour(part, numbers, product.context)
+        if part.size is not None:
+            self.validate(product, part.size)
         return product
+
+    def validate(self, product: _Product, size: ShapeSize) -> None:
+        """Say how large a product is."""
+        add, once = self.text.add, self.text.once
+        for name, item, measure, power in _VALIDATED:
+            value = real(float(f"{size.area if power == 2 else size.volume:.{_DIGITS}g}"))
+            unit = once(f"DERIVED_UNIT({refs([once(f'DERIVED_UNIT_ELEMENT(#{self._millimetre()},{power}.)')])})")
+            measured = add(f"MEASURE_REPRESENTATION_ITEM('{item}',{measure}_MEASURE({value}),#{unit})")
+            representation = add(f"REPRESENTATION('{name}',(#{measured}),#{product.context})")
+            defined = add(f"PROPERTY_DEFINITION('geometric validation property','{name}',#{product.shape})")
+            add(f"PROPERTY_DEFINITION_REPRESENTATION(#{defined},#{representation})")
 
     def _define(self, product: _Product) -> None:
         self.text.add(f"SHAPE_DEFINITION_REPRESENTATION(#{product.shape},#{product.representation})")
 
-    def _context(self, tolerance: float) -> int:
+    def _context(self, gap: float) -> int:
         """Units, and how far apart may be what belongs together."""
         once = self.text.once
-        length = once("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
+        length = self._millimetre()
         angle = once("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
         solid_angle = once("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
-        distance = real(_rounded_up(max(tolerance, _LEAST_UNCERTAINTY)))
+        distance = real(_rounded_up(max(gap, LEAST_GAP)))
         uncertainty = once(
             f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({distance}),#{length},"
             "'distance_accuracy_value','confusion accuracy')"
@@ -220,6 +259,9 @@ class _Products:
             f"GLOBAL_UNIT_ASSIGNED_CONTEXT({refs((length, angle, solid_angle))})"
             "REPRESENTATION_CONTEXT('','3D'))"
         )
+
+    def _millimetre(self) -> int:
+        return self.text.once("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
 
     def _occurrence(self, number: int, name: str, place: int, assembly: _Product, part: _Product) -> None:
         add = self.text.add

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepClass3d import BRepClass3d
 from OCP.BRepTools import BRepTools_WireExplorer
 from OCP.Geom import Geom_SphericalSurface
@@ -28,7 +29,12 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid,
 from gyroid_cad.kernel.step_geometry import Geometries, Placed, Spline, Triple, UnknownGeometryError
 from gyroid_cad.kernel.step_text import StepText, flag, quoted, refs
 
-__all__ = ["StepSolid", "read_solids", "require_solids"]
+__all__ = ["LEAST_GAP", "StepSolid", "read_solids", "require_solids"]
+
+# In mm: the kernel's smallest distance, which no tolerance is below.
+LEAST_GAP = 1e-7
+# Along an edge, from 0 to 1: by the golden ratio, so that they are not where a curve was fitted through points.
+_SAMPLES = np.arange(1, 18) * (np.sqrt(5) - 1) / 2 % 1
 
 # Of an edge: its number, and whether it is run from its first vertex to its last.
 Use = tuple[int, bool]
@@ -55,8 +61,8 @@ class StepSolid:
 
     Attributes
     ----------
-    tolerance : float
-        The largest of its edges and vertices, in mm.
+    gap : float
+        The largest in mm, of edges from their surfaces and from their ends.
     surfaces, curves : Geometries
     vertices : list of tuple of float
     edges : list of (first vertex, last vertex, curve)
@@ -65,7 +71,7 @@ class StepSolid:
         Which of them is not round a void.
     """
 
-    tolerance: float = 0.0
+    gap: float = 0.0
     surfaces: Geometries = field(default_factory=Geometries)
     curves: Geometries = field(default_factory=Geometries)
     vertices: list[Triple] = field(default_factory=list)
@@ -161,6 +167,7 @@ class _Reading:
     def __init__(self, solid: TopoDS_Shape) -> None:
         self.read = StepSolid()
         self._edges, self._vertices = NumberedShapes(), NumberedShapes()
+        self._meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]] = []
         # A solid is what its outer shell holds; that the kernel has it inside out is not for STEP to say.
         whole = solid.Oriented(TopAbs_FORWARD)
         shells = _children(whole)
@@ -173,6 +180,7 @@ class _Reading:
             # The shell of a void is written as seen from the void.
             turned = number != self.read.outer
             self.read.shells.append([self._face(as_face(face), turned) for face in _children(shell)])
+        self.read.gap = _largest_gap(self._meetings)
 
     def _face(self, face: TopoDS_Face, turned: bool) -> _Face:
         location = TopLoc_Location()
@@ -189,7 +197,7 @@ class _Reading:
         if wire.ShapeType() != TopAbs_WIRE:
             raise UnknownGeometryError("a face with more than wires")
         edges = [as_edge(edge) for edge in _children(wire)]
-        uses = [self._use(edge) for edge in edges if not BRep_Tool.Degenerated_s(edge)]
+        uses = [self._use(edge, face) for edge in edges if not BRep_Tool.Degenerated_s(edge)]
         # The whole of a ball has no border: its seam, and its poles, are the kernel's own affair.
         whole_ball = on_ball and len(edges) == 4 and len(uses) == 2 and uses[0][0] == uses[1][0]
         if whole_ball or not uses:
@@ -201,7 +209,7 @@ class _Reading:
         explorer, ordered = BRepTools_WireExplorer(as_wire(wire), as_face(face.Oriented(TopAbs_FORWARD))), []
         while explorer.More():
             if not BRep_Tool.Degenerated_s(explorer.Current()):
-                ordered.append(self._use(explorer.Current()))
+                ordered.append(self._use(explorer.Current(), face))
             explorer.Next()
         if sorted(ordered) != sorted(uses) or not self._joined(ordered):
             raise UnknownGeometryError("a wire that does not close")
@@ -212,17 +220,23 @@ class _Reading:
         ends = [self.read.edges[edge][:2] if along else self.read.edges[edge][1::-1] for edge, along in uses]
         return all(end == start for (_, end), (start, _) in zip(ends, [*ends[1:], ends[0]], strict=True))
 
-    def _use(self, edge: TopoDS_Edge) -> Use:
+    def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:
         along, known = _along(edge), self._edges.Extent()
         number = int(self._edges.Add(edge))
+        self._meet(BRep_Tool.Tolerance_s(edge), edge, face)
         if number > known:
             forward = as_edge(edge.Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
             curve = self.read.curves.number(BRep_Tool.Curve_s(forward, location, 0.0, 0.0), location)
-            first, last = TopExp.FirstVertex_s(forward), TopExp.LastVertex_s(forward)
-            self.read.edges.append((self._vertex(first), self._vertex(last), curve))
-            self.read.tolerance = max(self.read.tolerance, BRep_Tool.Tolerance_s(forward))
+            ends = TopExp.FirstVertex_s(forward), TopExp.LastVertex_s(forward)
+            self.read.edges.append((self._vertex(ends[0]), self._vertex(ends[1]), curve))
+            for end in ends:
+                self._meet(BRep_Tool.Tolerance_s(end), edge, end)
         return number - 1, along
+
+    def _meet(self, tolerance: float, edge: TopoDS_Edge, other: TopoDS_Face | TopoDS_Vertex) -> None:
+        if tolerance > LEAST_GAP:
+            self._meetings.append((tolerance, edge, other))
 
     def _vertex(self, vertex: TopoDS_Vertex) -> int:
         if vertex.IsNull():
@@ -232,8 +246,31 @@ class _Reading:
         if number > known:
             place = BRep_Tool.Pnt_s(vertex)
             self.read.vertices.append((place.X(), place.Y(), place.Z()))
-            self.read.tolerance = max(self.read.tolerance, BRep_Tool.Tolerance_s(vertex))
         return number - 1
+
+
+def _largest_gap(meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]]) -> float:
+    """Largest distance in mm of edges from the faces that they bound and the vertices where they end.
+
+    Parameters
+    ----------
+    meetings : list of (tolerance, edge, face or vertex)
+        No distance is above its tolerance, so that those with the largest tolerances are measured, and few others.
+    """
+    largest = 0.0
+    for tolerance, edge, other in sorted(meetings, key=lambda meeting: -meeting[0]):
+        if tolerance <= largest:
+            break
+        curve = BRepAdaptor_Curve(edge)
+        first, last = curve.FirstParameter(), curve.LastParameter()
+        if isinstance(other, TopoDS_Face):
+            on_face = BRepAdaptor_Curve(edge, other)
+            places = (first + (last - first) * _SAMPLES).tolist()
+            largest = max(largest, *(curve.Value(at).Distance(on_face.Value(at)) for at in places))
+        else:
+            # Of a closed edge both ends are there.
+            largest = max(largest, min(curve.Value(at).Distance(BRep_Tool.Pnt_s(other)) for at in (first, last)))
+    return largest
 
 
 def _children(shape: TopoDS_Shape) -> list[TopoDS_Shape]:

@@ -91,11 +91,7 @@ def closed_triangles(
     ParameterError, ExportError
     """
     near, away = _near_origin(shape, deviation)
-    bodies = _bodies(near, path, deviation, angle)
-    for _, triangles, _ in bodies:
-        if unmatched_edges(triangles):
-            raise _left_open(path, triangles, deviation)
-    vertices, triangles, _ = _together(bodies)
+    vertices, triangles, _ = _together(_bodies(near, path, deviation, angle))
     try:
         vertices, triangles = storable_triangles(vertices, triangles)
     except ExportError:

@@ -11,15 +11,17 @@ import build123d as bd
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
 from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
+from OCP.ShapeFix import ShapeFix_ShapeTolerance
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_ShapeEnum, TopAbs_VERTEX
 
 from gyroid_cad.common.formats import SCHEMAS
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
-from gyroid_cad.kernel.compat import NumberedShapes
+from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
@@ -148,3 +150,23 @@ def test_a_shape_with_an_offset_surface_is_left_to_the_kernels_writer_and_comes_
 def test_zeros_have_no_sign(tmp_path: Path) -> None:
     write_step((bd.Rot(90, 0, 180) * bd.Cone(3, 1, 5)).wrapped, tmp_path / "a.step")
     assert "-0." not in re.sub(r"-0\.\d", "", (tmp_path / "a.step").read_text())
+
+
+def uncertainty(path: Path) -> float:
+    return float(re.findall(r"LENGTH_MEASURE\(([^)]*)\)", path.read_text())[0])
+
+
+def test_the_uncertainty_is_how_far_edges_are_from_their_faces_not_what_somebody_stated(tmp_path: Path) -> None:
+    shape = bd.Box(3, 4, 5).wrapped
+    ShapeFix_ShapeTolerance().SetTolerance(shape, 1e-3)
+    write_step(shape, tmp_path / "box.step")
+    assert uncertainty(tmp_path / "box.step") == 1e-7
+    cut = MADE["cut to its box"]()
+    write_step(cut, tmp_path / "cut.step")
+    gaps = []
+    for face in parts_of(cut, TopAbs_FACE):
+        for edge in parts_of(face, TopAbs_EDGE):
+            curve, on_face = BRepAdaptor_Curve(as_edge(edge)), BRepAdaptor_Curve(as_edge(edge), as_face(face))
+            places = np.linspace(curve.FirstParameter(), curve.LastParameter(), 24).tolist()
+            gaps.append(max(curve.Value(at).Distance(on_face.Value(at)) for at in places))
+    assert 1e-7 < 0.9 * max(gaps) < uncertainty(tmp_path / "cut.step") < 2 * max(gaps)

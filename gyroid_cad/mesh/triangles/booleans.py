@@ -146,10 +146,17 @@ class Body:
         return np.repeat(np.asarray(mesh.run_original_id, dtype=np.int64), np.diff(mesh.run_index) // 3)
 
     def tolerant(self, tolerance: float) -> Body:
-        """The body without vertices that a shape within a tolerance in mm does not need.
+        """The body, whose cuts are simplified as they are made: vertices may go that no more than a tolerance tells.
 
-        Nor are there such where it is combined with others: those of a cut are left out as it is made, at no cost.
+        That takes no time, where simplifying what came out does.
 
+        Parameters
+        ----------
+        tolerance : float
+            In mm.
+
+        Examples
+        --------
         >>> cube = Body(Manifold.cube((2, 2, 2)))
         >>> dent = cube.moved(np.array([1.0, 1.0, 1.99]))
         >>> (cube - dent).triangle_count > (cube.tolerant(0.1) - dent).triangle_count

@@ -6,15 +6,14 @@ closed as triangles. Whole patches, of four edges, are cut as those of whole lat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot, unit
+from gyroid_cad.common.arrays import cross, dot, unit
 from gyroid_cad.mesh.triangles.grids import gridded
-from gyroid_cad.mesh.triangles.outlined import Outline, Surfaces, bending, ranges_of
+from gyroid_cad.mesh.triangles.outlined import Outlines, Surfaces, bending
 from gyroid_cad.mesh.triangles.plane import delaunay, parted, shared_sides, twice_area
 from gyroid_cad.mesh.triangles.templates import FEWEST_STEPS, face_template, few_counts
 
@@ -79,13 +78,13 @@ class _Work:
 
 
 def triangulated_faces(
-    outlines: Sequence[Outline], surfaces: Surfaces, points: Floats, limit: float, angle: float
+    outlines: Outlines, surfaces: Surfaces, points: Floats, limit: float, angle: float
 ) -> FaceTriangles:
     """Triangles of faces, with the places along their borders as they are and others inside them.
 
     Parameters
     ----------
-    outlines : sequence of Outline
+    outlines : Outlines
     surfaces : Surfaces
     points : ndarray, shape (vertices, 3)
         In mm.
@@ -96,20 +95,19 @@ def triangulated_faces(
     """
     bends = bending(outlines, surfaces)
     counts = bends.squares(limit, angle)
-    squares = np.array([outline.square is not None for outline in outlines], dtype=bool)
+    square = outlines.squares[:, 0] > 0
     steps = few_counts(np.maximum(counts.max(axis=1), FEWEST_STEPS))
-    whole = _whole(outlines, np.flatnonzero(squares), steps, surfaces, points)
+    whole = _whole(outlines, np.flatnonzero(square), steps, surfaces, points)
     # Where a surface bends more along one parameter than along the other, triangles are long along the other.
     flat = counts.max(axis=1, keepdims=True) == 1
     scale = np.where(flat, bends.lengths, counts) / bends.extent
-    work = _begun(outlines, np.flatnonzero(~squares), counts, scale, surfaces, points, len(whole.vertices))
+    work = _begun(outlines, np.flatnonzero(~square), counts, scale, surfaces, whole.vertices)
     work = _near_enough(work, limit)
     work = _told_apart(work, whole.triangles)
     made = work.vertices[work.triangles]
     owner = work.owner[work.triangles[:, 0]]
     area = twice_area(work.flat, work.triangles)
-    crossed = np.zeros(len(outlines), dtype=bool)
-    crossed[owner[area < -limit * limit * 1e-6]] = True
+    crossed = np.bincount(owner[area < -limit * limit * 1e-6], minlength=len(square)) > 0
     # At a pole all places are one.
     kept = np.all(made != np.roll(made, 1, axis=1), axis=1)
     inside = work.points[_first_of(work.vertices, len(whole.vertices))]
@@ -134,68 +132,56 @@ def _first_of(vertices: Integers, first: int) -> Integers:
 def _of_volume(made: _Placed, surfaces: Surfaces, first: int) -> Floats:
     """Vertices, those inside faces moved along the normals until each face has as much on one side as on the other.
 
-    Between a triangle and a quadratic surface through its corners lies its area times the mean of the distances in the
-    middles of its sides. The vertices of a face, from a first number on, all move by as much, never further than the
-    triangles are off: those along borders, which other faces have too, stay.
+    Between a triangle and a quadratic surface through its corners lies its area times 3/4 of the distance in its
+    middle. The vertices of a face, from a first number on, all move by as much, never further than the triangles are
+    off: those along borders, which other faces have too, stay.
     """
     vertices, triangles, faces = made.vertices, made.triangles, made.faces
-    off = _sides_off(made, surfaces)
+    found, normals = surfaces.evaluated(faces, made.corners.mean(axis=1))
+    normals = unit(normals)
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    off = dot((a + b + c) / 3 - found, normals)
+    area = np.linalg.norm(cross((b - a).T, (c - a).T), axis=0) / 2
     inside = triangles >= first
     count = int(faces.max(initial=-1)) + 1
-    excess = np.bincount(faces, area * off.sum(axis=1), count)
-    movable = np.bincount(faces, area * inside.sum(axis=1), count)
+    excess = np.bincount(faces, 3 / 4 * area * off, count)
+    movable = np.bincount(faces, area * inside.sum(axis=1) / 3, count)
     furthest = np.zeros(count)
-    np.maximum.at(furthest, faces, np.abs(off).max(axis=1))
+    np.maximum.at(furthest, faces, np.abs(off))
     by = np.divide(-excess, movable, out=np.zeros(count), where=movable > 0).clip(-furthest, furthest)
-    owner, places = np.zeros(len(vertices), dtype=np.int64), np.zeros((len(vertices), 2))
-    owner[triangles[inside]] = np.repeat(faces, inside.sum(axis=1))
-    places[triangles[inside]] = made.corners[inside]
-    normals = unit(surfaces.evaluated(owner[first:], places[first:])[1])
-    return np.concatenate([vertices[:first], vertices[first:] + by[owner[first:], np.newaxis] * normals])
-
-
-def _sides_off(made: _Placed, surfaces: Surfaces) -> Floats:
-    """Distances of the middles of triangles' sides from the surface, along its normals; shape (triangles, 3)."""
-    triangles, faces = made.triangles, made.faces
-    one, other = shared_sides(triangles)
-    within = faces[one // 3] == faces[other // 3]
-    twin = np.arange(triangles.size)
-    twin[other[within]] = one[within]
-    own = np.flatnonzero(twin == np.arange(triangles.size))
-    places = (made.corners + np.roll(made.corners, -1, axis=1)).reshape(-1, 2)[own] / 2
-    found, normals = surfaces.evaluated(np.repeat(faces, 3)[own], places)
-    chords = (made.vertices[triangles] + made.vertices[np.roll(triangles, -1, axis=1)]).reshape(-1, 3)[own] / 2
-    off = np.zeros(triangles.size)
-    off[own] = dot(chords - found, unit(normals))
-    return np.asarray(off[twin].reshape(-1, 3))
+    # The normal at a vertex is the mean of those in the middles of the triangles round it.
+    corner, of = triangles[inside] - first, np.nonzero(inside)[0]
+    total = len(vertices) - first
+    weighted = area[:, np.newaxis] * normals
+    mean = np.zeros((total, 3))
+    for axis in range(3):
+        mean[:, axis] = np.bincount(corner, weighted[of, axis], total)
+    owner = np.zeros(total, dtype=np.int64)
+    owner[corner] = faces[of]
+    return np.concatenate([vertices[:first], vertices[first:] + by[owner, np.newaxis] * unit(mean)])
 
 
 # Whole patches --------------------------------------------------------------------------------------------------------
 
 
-def _whole(
-    outlines: Sequence[Outline], faces: Integers, steps: Integers, surfaces: Surfaces, points: Floats
-) -> _Placed:
+def _whole(outlines: Outlines, faces: Integers, steps: Integers, surfaces: Surfaces, points: Floats) -> _Placed:
     """All points with those inside whole patches, and the triangles of these."""
-    keys = np.array([(int(steps[face]), *(outlines[face].square or ())) for face in faces.tolist()], dtype=np.int64)
-    kinds, which = np.unique(keys.reshape(-1, 5), axis=0, return_inverse=True)
+    kinds, which = np.unique(np.column_stack([steps, outlines.squares])[faces], axis=0, return_inverse=True)
+    (low, high), firsts = outlines.ranges, outlines.firsts
+    middle, half = (low + high) / 2, (high - low) / 2
     made, triangles, owners, count = [points], [np.empty((0, 3), dtype=np.int64)], [faces[:0]], len(points)
     corners = [np.empty((0, 3, 2))]
-    for number, kind in enumerate(kinds.tolist()):
-        template = face_template(kind[0], (kind[1], kind[2], kind[3], kind[4]))
+    for number, (inner, *edges) in enumerate(kinds.tolist()):
+        template = face_template(inner, (edges[0], edges[1], edges[2], edges[3]))
         some = faces[which.ravel() == number]
-        rim = sum(kind[1:])
-        low, high = ranges_of([outlines[face] for face in some.tolist()])
-        middle, half = (low + high) / 2, (high - low) / 2
-        places = middle[:, np.newaxis] + template.places * half[:, np.newaxis]
+        rim = sum(edges)
+        places = middle[some, np.newaxis] + template.places * half[some, np.newaxis]
         inside = len(template.places) - rim
         found, _ = surfaces.evaluated(np.repeat(some, inside), places[:, rim:].reshape(-1, 2))
         # Of a template the corners come first, then what lies between them.
-        starts = np.cumsum([0, *kind[1:]])
+        starts = np.cumsum([0, *edges])
         order = np.concatenate([starts[:4], *(np.arange(starts[k] + 1, starts[k + 1]) for k in range(4))])
-        border = np.array([outlines[face].loops[0][1][order] for face in some.tolist()])
+        border = outlines.vertices[firsts[some, np.newaxis] + order]
         numbers = np.concatenate([border, count + np.arange(len(found)).reshape(len(some), inside)], axis=1)
         made.append(found)
         triangles.append(numbers[:, template.triangles].reshape(-1, 3))
@@ -209,48 +195,28 @@ def _whole(
 
 
 def _begun(
-    outlines: Sequence[Outline],
+    outlines: Outlines,
     faces: Integers,
     counts: Integers,
     scale: Floats,
     surfaces: Surfaces,
-    points: Floats,
-    first: int,
+    vertices: Floats,
 ) -> _Work:
-    """Grids and bands of trimmed faces; places inside them are vertices from a first one on."""
-    places, owner, vertices, triangles = [np.empty((0, 2))], [faces[:0]], [faces[:0]], [np.empty((0, 3), np.int64)]
-    count = 0
-    low, high = ranges_of([outlines[face] for face in faces.tolist()])
-    for index, face in enumerate(faces.tolist()):
-        loops = [loop for loop, _ in outlines[face].loops]
-        stretch, shape = scale[face], (int(counts[face, 0]), int(counts[face, 1]))
-        nodes, made = gridded(
-            [loop * stretch for loop in loops],
-            low[index] * stretch,
-            (high - low)[index] * stretch / np.array(shape),
-            shape,
-        )
-        own = [*loops, nodes / stretch]
-        places += own
-        vertices += [*(numbers for _, numbers in outlines[face].loops), first + np.arange(len(nodes))]
-        first += len(nodes)
-        triangles.append(made + count)
-        here = sum(map(len, own))
-        owner.append(np.full(here, face))
-        count += here
+    """Grids and bands of trimmed faces, their places numbered after the vertices that are there."""
+    low, owners = outlines.ranges[0], outlines.owners
+    units = (outlines.places - low[owners]) * scale[owners]
+    nodes, faces_of_nodes, triangles = gridded(outlines, faces, units, counts)
+    inside = low[faces_of_nodes] + nodes / scale[faces_of_nodes]
     work = _Work(
         surfaces,
         scale,
-        np.concatenate(places),
-        np.concatenate(owner),
-        np.concatenate(vertices),
-        np.empty((count, 3)),
-        np.concatenate(triangles),
-        first,
+        np.concatenate([outlines.places, inside]),
+        np.concatenate([owners, faces_of_nodes]),
+        np.concatenate([outlines.vertices, len(vertices) + np.arange(len(nodes))]),
+        np.concatenate([vertices[outlines.vertices], surfaces.evaluated(faces_of_nodes, inside)[0]]),
+        triangles,
+        len(vertices) + len(nodes),
     )
-    known = work.vertices < len(points)
-    work.points[known] = points[work.vertices[known]]
-    work.points[~known] = surfaces.evaluated(work.owner[~known], work.places[~known])[0]
     return _exchanged(work)
 
 
@@ -283,10 +249,14 @@ def _told_apart(work: _Work, others: Integers) -> _Work:
         shared = shared[3 * len(others) :]
         one, other = shared_sides(work.triangles)
         a, b = work.triangles.ravel()[one], np.roll(work.triangles, -1, axis=1).ravel()[one]
-        wrong = shared[one] | shared[other] | ((work.vertices[a] == work.vertices[b]) & (_length(work, a, b) > 0))
+        looped = work.vertices[a] == work.vertices[b]
+        some = np.flatnonzero(shared[one] | shared[other] | looped)
+        length = _length(work, a[some], b[some])
+        wrong = ~looped[some] | (length > 0)
         if not wrong.any():
             break
-        work = _with_middles(work, one[wrong], other[wrong], _length(work, a, b)[wrong])
+        some = some[wrong]
+        work = _with_middles(work, one[some], other[some], length[wrong])
     return work
 
 

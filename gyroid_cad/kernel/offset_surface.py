@@ -49,7 +49,7 @@ _SAME = 1e-9
 _POLE, _BESIDE = 1e-7, 1e-6
 # By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
 _LEAST_STRETCH = 1e-4
-_SAMPLES, _STEP = 9, 1e-5
+_SAMPLES, _CLOSELY, _STEP = 9, 21, 1e-5
 # How far tubes go on outside an opening, in radians.
 _BEYOND = 0.35
 
@@ -126,16 +126,25 @@ class FaceOffset:
 
     def bent_away(self) -> bool:
         """True where the face is bent more than the offset is wide, all over: then nothing of it bounds a core."""
-        places = self._grid(_SAMPLES)
-        step = _STEP * np.ptp(self.bounds, axis=1)
-        _, along_u, along_v = self._derivatives(places)
-        moved = [
-            (self.points(places + shift) - self.points(places - shift)) / (2 * step[way])
-            for way, shift in enumerate(np.diag(step))
-        ]
-        basis = np.stack([along_u, along_v], axis=-1)
-        stretch = np.linalg.pinv(basis) @ np.stack(moved, axis=-1)
-        return bool(np.all(np.linalg.eigvals(stretch).real.min(axis=1) < _LEAST_STRETCH))
+        return bool(np.all(1 - self.by * self._curvatures(self._grid(_SAMPLES)) < _LEAST_STRETCH))
+
+    def folding(self) -> tuple[float, float, Floats]:
+        """Smallest and largest radius to which the face is bent outwards, in mm, and the place of the smallest.
+
+        An offset between these folds over: it is turned inside out in some places and not in others.
+        """
+        places = self._grid(_CLOSELY)
+        found = np.maximum(self._curvatures(places), np.finfo(float).tiny)
+        worst = int(np.argmax(found))
+        return float(1 / found[worst]), float(1 / found.min()), self._derivatives(places[[worst]])[0][0]
+
+    def _curvatures(self, places: Floats) -> Floats:
+        """Larger principal curvature at parameters, above 0 where the face is bent outwards; shape (n,)."""
+        steps = np.diag(_STEP * np.ptp(self.bounds, axis=1))
+        _, *along = self._derivatives(places)
+        turns = [(self.normals(places + step) - self.normals(places - step)) / (2 * step.sum()) for step in steps]
+        shape = np.linalg.pinv(np.stack(along, axis=-1)) @ np.stack(turns, axis=-1)
+        return np.asarray(np.linalg.eigvals(shape).real.max(axis=1))
 
     def points(self, places: Floats) -> Floats:
         """Points of the offset at parameters, shape (n, 2); shape (n, 3)."""

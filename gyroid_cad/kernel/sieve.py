@@ -22,7 +22,7 @@ from gyroid_cad.kernel.offset_pieces import offset_pieces
 from gyroid_cad.kernel.offset_surface import curve_points
 from gyroid_cad.kernel.split import Change, changes, general_fuse, modified, solids_of
 
-__all__ = ["core_of_pieces", "with_changes"]
+__all__ = ["OpenSkinError", "core_of_pieces", "with_changes"]
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,23 @@ _MOST = 0.5
 _FUZZY = (0.0, 1e-3)
 # Of the thickness of a skin, by which it is thinner or thicker where offsets touch without crossing else.
 _NEARLY = (0.0, -5e-4, 5e-4)
+
+
+class OpenSkinError(KernelError):
+    """Failure of a skin's inner side to close.
+
+    Parameters
+    ----------
+    point : ndarray, shape (3,)
+        Where, in mm.
+    beside : str
+        What is there.
+    """
+
+    def __init__(self, point: Floats, beside: str = "") -> None:
+        place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in point.tolist())
+        super().__init__(f"the inner side of the skin does not close round ({place}){beside}")
+        self.point = point
 
 
 def core_of_pieces(solid: TopoDS_Solid, skin: float, openings: Sequence[TopoDS_Face] = ()) -> list[TopoDS_Solid]:
@@ -162,8 +179,7 @@ def _require_closed(faces: Sequence[TopoDS_Face]) -> None:
         if len(users) != 2 or users[0][1] == users[1][1]:
             curve = BRepAdaptor_Curve(edge)
             middle = (curve.FirstParameter() + curve.LastParameter()) / 2
-            place = ", ".join(f"{x:.4g}" for x in curve_points(curve, np.array([middle]))[0])
-            raise KernelError(f"the inner side of the skin does not close round ({place})")
+            raise OpenSkinError(curve_points(curve, np.array([middle]))[0])
 
 
 def with_changes(faces: Iterable[TopoDS_Face], changed: Iterable[Change]) -> list[TopoDS_Face]:

@@ -256,6 +256,18 @@ def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatc
         parted(box())
 
 
+def test_a_refusal_names_the_face_that_is_bent_too_narrowly_and_what_can_be_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # At its ends an ellipse of half axes a and b has the radius b2 / a, at its sides a2 / b.
+    prism = bd.extrude(bd.make_face(bd.Ellipse(6, 3).edges()), 12)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", lambda *arguments: (None for _ in CLOSED_WAYS))
+    with pytest.raises(KernelError, match=r"face \d is bent to a radius of 1\.5\d* mm at .* only below that"):
+        hollow(require_part(wrapped(prism)), 2.0)
+    with pytest.raises(KernelError, match="by 1 mm; another thickness may do"):
+        hollow(require_part(wrapped(prism)), 1.0)
+
+
 def crashes(*arguments: str) -> None:
     os.abort()
 

@@ -101,9 +101,10 @@ def write_step(
 ) -> None:
     """Write a shape in millimetres.
 
-    Solids or shells of known geometry are written from arrays, with what faces and edges have in common once, and without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so
-    that readers find those curves again, and files are a third smaller. Of anything else, such as an offset surface,
-    a face of no solid or a mirrored copy, the kernel's own writer makes the file, with these curves.
+    Solids or shells of known geometry are written from arrays, with what faces and edges have in common once, and
+    without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so that
+    readers find those curves again, and files are over a quarter smaller. Of anything else, such as an offset surface,
+    a loose face or a mirrored copy, the kernel's own writer makes the file, with these curves.
 
     Parameters
     ----------

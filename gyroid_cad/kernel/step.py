@@ -75,7 +75,7 @@ def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Sh
     whole = solids <= found.solids <= wanted.solids and faces <= found.faces <= wanted.faces
     if not whole or found.open_edges > wanted.open_edges:
         raise ExportError(
-            f"{path} was not written: the kernel's STEP writer gave {found.solids} of {wanted.solids} solids, "
+            f"{path} was not written: its text held {found.solids} of {wanted.solids} solids, "
             f"{found.faces} of {wanted.faces} faces and {found.open_edges} open edges; BREP holds the shape as it is"
         )
 
@@ -101,10 +101,10 @@ def write_step(
 ) -> None:
     """Write a shape in millimetres.
 
-    Solids whose geometry STEP has words for are written from arrays, with what faces and edges have in common once,
-    and without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so
-    that readers find those curves again, and files are a third smaller. Of anything else, such as an offset surface,
-    a face of no solid or a mirrored copy, the kernel's own writer makes the file, with these curves.
+    Solids or shells of known geometry are written from arrays, with what faces and edges have in common once, and
+    without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so that
+    readers find those curves again, and files are over a quarter smaller. Of anything else, such as an offset surface,
+    a loose face or a mirrored copy, the kernel's own writer makes the file, with these curves.
 
     Parameters
     ----------

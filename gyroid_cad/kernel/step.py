@@ -98,6 +98,7 @@ def write_step(
     schema: Schema = "ap214",
     name: str | None = None,
     size: ShapeSize | None = None,
+    body_names: Sequence[str] = (),
 ) -> None:
     """Write a shape in millimetres.
 
@@ -116,6 +117,8 @@ def write_step(
         Of the product; the file's stem if left out.
     size : ShapeSize, optional
         For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
+    body_names : sequence of str
+        One a solid, as the kernel counts them, or none; left out likewise.
 
     Raises
     ------
@@ -123,7 +126,7 @@ def write_step(
     """
     product, kernel_schema = product_name(path, name), require_schema(schema)
     try:
-        parts, places = products_of(shape, product)
+        parts, places = products_of(shape, product, body_names)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, kernel_schema, product)
     else:

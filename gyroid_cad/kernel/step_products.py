@@ -71,6 +71,8 @@ class StepPart:
     bodies : sequence of StepBody
     colour : str
         By which STEP knows it; that of the file's reader if left out.
+    body_names : sequence of str
+        One a body, or none.
     face_names, face_colours : sequence of str
         One a face, as the kernel counts them, or none.
     size : ShapeSize, optional
@@ -79,6 +81,7 @@ class StepPart:
     name: str
     bodies: Sequence[StepBody]
     colour: str = ""
+    body_names: Sequence[str] = ()
     face_names: Sequence[str] = ()
     face_colours: Sequence[str] = ()
     size: ShapeSize | None = None
@@ -133,7 +136,9 @@ def write_products(
         out.write("ENDSEC;\nEND-ISO-10303-21;\n")
 
 
-def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Occurrence]]:
+def products_of(
+    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = ()
+) -> tuple[list[StepPart], list[Occurrence]]:
     """Return the parts that a shape is written as, and their places if it has a solid in several.
 
     Parameters
@@ -141,6 +146,8 @@ def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Oc
     shape : TopoDS_Shape
     name : str
         Of the product.
+    body_names : sequence of str
+        One a body, as the kernel counts them, or none.
 
     Raises
     ------
@@ -149,7 +156,7 @@ def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Oc
     kinds, bodies = NumberedShapes(), list(parts_of(shape, require_bodies(shape)))
     which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
     if len(bodies) == kinds.Extent():
-        return [StepPart(name, read_step_bodies(shape))], []
+        return [StepPart(name, read_step_bodies(shape), body_names=body_names)], []
     parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
     places = [axis_placement(body.Location()) for body in bodies]
     return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
@@ -215,8 +222,8 @@ class _Products:
 
     def part(self, part: StepPart, name: str) -> _Product:
         product = self._product(name)
-        names = iter(part.face_names)
-        numbers = [body.write(self.text, names) for body in part.bodies]
+        names, face_names = iter(part.body_names), iter(part.face_names)
+        numbers = [body.write(self.text, next(names, ""), face_names) for body in part.bodies]
         product.context = self._context(max(body.gap for body in part.bodies))
         items = refs([self.text.frame(*_HOME), *(body for body, _ in numbers)])
         kind = "ADVANCED_BREP" if part.bodies[0].solid else "MANIFOLD_SURFACE"

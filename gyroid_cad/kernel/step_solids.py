@@ -89,12 +89,13 @@ class StepBody:
         places = [np.array(self.vertices), *(one.poles for one in splines)]
         return max(float(np.abs(some).max()) for some in places)
 
-    def write(self, text: StepText, face_names: Iterator[str]) -> tuple[int, list[int]]:
+    def write(self, text: StepText, name: str, face_names: Iterator[str]) -> tuple[int, list[int]]:
         """Write the body.
 
         Parameters
         ----------
         text : StepText
+        name : str
         face_names : iterator of str
             One a face, as the kernel counts them, or none.
 
@@ -126,12 +127,12 @@ class StepBody:
             shells.append(text.add(f"{'CLOSED' if self.solid else 'OPEN'}_SHELL('',{refs(numbers)})"))
             faces += numbers
         if not self.solid:
-            return text.add(f"SHELL_BASED_SURFACE_MODEL('',{refs(shells)})"), faces
+            return text.add(f"SHELL_BASED_SURFACE_MODEL({quoted(name)},{refs(shells)})"), faces
         outer = shells.pop(self.outer)
         if not shells:
-            return text.add(f"MANIFOLD_SOLID_BREP('',#{outer})"), faces
+            return text.add(f"MANIFOLD_SOLID_BREP({quoted(name)},#{outer})"), faces
         voids = text.add_all(f"ORIENTED_CLOSED_SHELL('',*,#{shell},.F.)" for shell in shells)
-        return text.add(f"BREP_WITH_VOIDS('',#{outer},{refs(voids)})"), faces
+        return text.add(f"BREP_WITH_VOIDS({quoted(name)},#{outer},{refs(voids)})"), faces
 
     def _bound(self, text: StepText, loop: _Loop, vertices: range, edges: range, forward: bool) -> int:
         if loop.vertex is not None:

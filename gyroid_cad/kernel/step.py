@@ -75,7 +75,7 @@ def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Sh
     whole = solids <= found.solids <= wanted.solids and faces <= found.faces <= wanted.faces
     if not whole or found.open_edges > wanted.open_edges:
         raise ExportError(
-            f"{path} was not written: the kernel's STEP writer gave {found.solids} of {wanted.solids} solids, "
+            f"{path} was not written: its text held {found.solids} of {wanted.solids} solids, "
             f"{found.faces} of {wanted.faces} faces and {found.open_edges} open edges; BREP holds the shape as it is"
         )
 
@@ -98,13 +98,14 @@ def write_step(
     schema: Schema = "ap214",
     name: str | None = None,
     size: ShapeSize | None = None,
+    body_names: Sequence[str] = (),
 ) -> None:
     """Write a shape in millimetres.
 
-    Solids whose geometry STEP has words for are written from arrays, with what faces and edges have in common once,
-    and without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so
-    that readers find those curves again, and files are a third smaller. Of anything else, such as an offset surface,
-    a face of no solid or a mirrored copy, the kernel's own writer makes the file, with these curves.
+    Solids or shells of known geometry are written from arrays, with what faces and edges have in common once, and
+    without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so that
+    readers find those curves again, and files are over a quarter smaller. Of anything else, such as an offset surface,
+    a loose face or a mirrored copy, the kernel's own writer makes the file, with these curves.
 
     Parameters
     ----------
@@ -116,6 +117,8 @@ def write_step(
         Of the product; the file's stem if left out.
     size : ShapeSize, optional
         For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
+    body_names : sequence of str
+        One a solid, as the kernel counts them, or none; left out likewise.
 
     Raises
     ------
@@ -123,7 +126,7 @@ def write_step(
     """
     product, kernel_schema = product_name(path, name), require_schema(schema)
     try:
-        parts, places = products_of(shape, product)
+        parts, places = products_of(shape, product, body_names)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, kernel_schema, product)
     else:

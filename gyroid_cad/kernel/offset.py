@@ -268,7 +268,7 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
 
 
 def _possible(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> str:
-    """Thickness below which no face is bent too narrowly, if one is for that which was asked for."""
+    """Thickness below which no offset of a face folds, where one does with that which was asked for."""
     faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
     folding = [
         (number, *FaceOffset(face, 0.0, skin).folding())
@@ -279,7 +279,7 @@ def _possible(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float)
     while narrow := [one for one in folding if one[1] < most < one[2] * (1 - _SAME_RADIUS)]:
         number, most, _, place = min(narrow, key=lambda one: one[1])
         where = ", ".join(f"{round(x, 3) + 0.0:g}" for x in place.tolist())
-        found = f"face {number} is bent to a radius of {most:.3g} mm at ({where}): only below that can it be made; "
+        found = f"face {number} is bent to a radius of {most:.3g} mm at ({where}): below that it can be made; "
     return found
 
 

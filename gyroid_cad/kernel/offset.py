@@ -279,7 +279,7 @@ def _possible(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float)
     while narrow := [one for one in folding if one[1] < most < one[2] * (1 - _SAME_RADIUS)]:
         number, most, _, place = min(narrow, key=lambda one: one[1])
         where = ", ".join(f"{round(x, 3) + 0.0:g}" for x in place.tolist())
-        found = f"face {number} is bent to a radius of {most:.3g} mm at ({where}): below that it can be made; "
+        found = f"below {most:.3g} mm no offset folds over, a radius to which face {number} is bent at ({where}); "
     return found
 
 

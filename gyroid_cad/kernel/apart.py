@@ -16,11 +16,11 @@ from OCP.TopoDS import TopoDS_Iterator, TopoDS_Shape
 
 from gyroid_cad.common.formats import BREP, STEP, Format, format_of
 from gyroid_cad.common.inputs import unreadable, utf8_named
+from gyroid_cad.common.processes import Started, started
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.assembly import read_bodies
 from gyroid_cad.kernel.brep import read_brep
 from gyroid_cad.kernel.check import compound_of
-from gyroid_cad.kernel.processes import Started, started
 from gyroid_cad.kernel.step import read_step
 
 __all__ = [

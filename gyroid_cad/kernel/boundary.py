@@ -40,14 +40,17 @@ from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.basis import orders, quotients
 from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
-from gyroid_cad.trim.surfaces import FreeForm, PartSurface, Quadric, QuadricKind, Swept
+from gyroid_cad.trim.free_surfaces import FreeForm, Swept
+from gyroid_cad.trim.surfaces import PartSurface, Quadric, QuadricKind
 
 __all__ = ["ReadBoundary", "part_surface", "read_boundary"]
 
 Floats = NDArray[np.float64]
 # From parameters (n,) to points and derivatives; from two of them to points and derivatives by s, t, ss, st and tt.
 Curve = Callable[[Floats], tuple[Floats, ...]]
-Derivatives = Callable[[Floats, Floats], tuple[Floats, ...]]
+Derivatives = Callable[[Floats, int], tuple[Floats, ...]]
+# How many a surface has up to each order, itself among them.
+_COUNTS = (1, 3, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,15 +208,15 @@ def _derivatives(adaptor: BRepAdaptor_Surface) -> Derivatives:
     if kind == GeomAbs_SurfaceOfExtrusion:
         return _of_extrusion(np.array(_values(adaptor.Direction())), _curve_in_space(adaptor.BasisCurve(), 2))
 
-    def asked(s: Floats, t: Floats) -> tuple[Floats, ...]:
-        made = np.empty((6, len(s), 3))
+    def asked(places: Floats, order: int) -> tuple[Floats, ...]:
+        made = np.empty((6, len(places), 3))
         point, vectors = gp_Pnt(), [gp_Vec() for _ in range(5)]
         ds, dt, dss, dtt, dst = vectors
-        for index, (u, v) in enumerate(zip(s.tolist(), t.tolist(), strict=True)):
+        for index, (u, v) in enumerate(places.tolist()):
             adaptor.D2(u, v, point, ds, dt, dss, dtt, dst)
             for row, value in enumerate((point, ds, dt, dss, dst, dtt)):
                 made[row, index] = _values(value)
-        return tuple(made)
+        return tuple(made[: _COUNTS[order]])
 
     return asked
 
@@ -227,21 +230,24 @@ def _of_spline(spline: Geom_BSplineSurface) -> Derivatives | None:
         return None
     # By scipy, which looks at the few functions alone that do not vanish: lofts have a hundred along each parameter.
     weights = surface.weights[..., np.newaxis]
-    plain = NdBSpline(knots, surface.control_points * weights, degrees)
-    below = None if np.ptp(weights) == 0 else NdBSpline(knots, weights, degrees)
+    rational = np.ptp(weights) > 0
+    together = NdBSpline(
+        knots, np.concatenate([surface.control_points * weights, weights[..., : int(rational)]], -1), degrees
+    )
 
-    def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
-        places = np.stack([s, t], axis=-1)
-        values = {order: plain(places, nu=order) for order in orders(2, 2)}
-        if below is None:
+    def found(places: Floats, order: int) -> tuple[Floats, ...]:
+        values = {of: together(places, nu=of) for of in orders(order, 2)}
+        if not rational:
             return tuple(value / surface.weights[0, 0] for value in values.values())
-        return tuple(quotients(values, {order: below(places, nu=order) for order in orders(2, 2)}).values())
+        above, below = ({of: value[:, part] for of, value in values.items()} for part in (slice(3), slice(3, 4)))
+        return tuple(quotients(above, below).values())
 
     return found
 
 
 def _of_revolution(origin: Floats, axis: Floats, curve: Curve) -> Derivatives:
-    def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
+    def found(places: Floats, order: int) -> tuple[Floats, ...]:
+        s, t = places.T
         cosine, sine = np.cos(s)[:, np.newaxis], np.sin(s)[:, np.newaxis]
 
         def turned(vectors: Floats) -> tuple[Floats, Floats, Floats]:
@@ -253,16 +259,18 @@ def _of_revolution(origin: Floats, axis: Floats, curve: Curve) -> Derivatives:
 
         point, rate, bend = curve(t)
         (x, ds, dss), (dt, dst, _), (dtt, _, _) = turned(point - origin), turned(rate), turned(bend)
-        return origin + x, ds, dt, dss, dst, dtt
+        return (origin + x, ds, dt, dss, dst, dtt)[: _COUNTS[order]]
 
     return found
 
 
 def _of_extrusion(direction: Floats, curve: Curve) -> Derivatives:
-    def found(s: Floats, t: Floats) -> tuple[Floats, ...]:
+    def found(places: Floats, order: int) -> tuple[Floats, ...]:
+        s, t = places.T
         point, rate, bend = curve(s)
         none = np.zeros_like(point)
-        return point + t[:, np.newaxis] * direction, rate, none + direction, bend, none, none
+        every = point + t[:, np.newaxis] * direction, rate, none + direction, bend, none, none
+        return every[: _COUNTS[order]]
 
     return found
 

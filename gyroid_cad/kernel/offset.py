@@ -31,12 +31,12 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, 
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
+from gyroid_cad.common.processes import Started, started
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.ordered import in_order, sorted_by_place
-from gyroid_cad.kernel.processes import Started, started
 from gyroid_cad.kernel.sieve import core_of_pieces
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]

@@ -16,11 +16,12 @@ Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 _NEWTON_STEPS, _TURNING_STEPS = 40, 3
-_CONVERGED = 1e-14
+# What a step of Newton's method leaves is its square; what one by bisection leaves is as long as itself.
+_CONVERGED, _SQUARED = 1e-14, 1e-9
 _ROUNDING = 1e-13
 # A parabola that turns back between samples comes at most an eighth of its second difference nearer zero than they do.
 _HIDDEN = 1 / 4
-# Steps to the nearest place, and how small the last is: what that leaves in the distance is its square.
+# Steps to the nearest place, and how small the last is, whose square is what it leaves.
 _NEAREST_STEPS, _NEAREST_CONVERGED = 40, 1e-8
 # How long the first step may be, in the square's parameters; and how far a squared distance must bend upwards at least,
 # in parts of the squared derivatives.
@@ -58,16 +59,18 @@ def roots(
     low_value = np.concatenate([low_value, values[turned, before], turn_value])
     high_value = np.concatenate([high_value, turn_value, values[turned, before + 1]])
     place = low + (high - low) * low_value / (low_value - high_value)
+    left = np.arange(len(which))
     for _ in range(_NEWTON_STEPS):
-        value, rate = at(which, place)
-        early = (value > 0) == (low_value > 0)
-        low, high = np.where(early, place, low), np.where(early, high, place)
+        here = place[left]
+        value, rate = at(which[left], here)
+        early = (value > 0) == (low_value[left] > 0)
+        low[left], high[left] = np.where(early, here, low[left]), np.where(early, high[left], here)
         with np.errstate(divide="ignore", invalid="ignore"):
-            nearer = place - value / rate
-        astray = ~((nearer >= low - _CONVERGED) & (nearer <= high + _CONVERGED))
-        nearer = np.where(astray, (low + high) / 2, np.clip(nearer, low, high))
-        step, place = np.max(np.abs(nearer - place), initial=0.0), nearer
-        if step < _CONVERGED:
+            nearer = here - value / rate
+        astray = ~((nearer >= low[left] - _CONVERGED) & (nearer <= high[left] + _CONVERGED))
+        place[left] = np.where(astray, (low[left] + high[left]) / 2, np.clip(nearer, low[left], high[left]))
+        left = left[np.abs(place[left] - here) >= np.where(astray, _CONVERGED, _SQUARED)]
+        if not len(left):
             break
     order = np.lexsort((place, which))
     return which[order], place[order]
@@ -185,13 +188,13 @@ def nearest_places(
     for _ in range(_NEAREST_STEPS):
         tried = np.clip(place + _downhill(place, points, found, reach), -1, 1)
         length = np.abs(tried - place).max(axis=1)
-        if length.max(initial=0.0) < _NEAREST_CONVERGED:
-            break
         there = derivatives(*tried.T)
         away = np.linalg.norm(points - there[0], axis=-1)
         nearer = away <= distance
         reach = np.where(nearer, 2 * reach, length / 4)
         place, distance = np.where(nearer[:, np.newaxis], tried, place), np.where(nearer, away, distance)
+        if length.max(initial=0.0) < _NEAREST_CONVERGED:
+            break
         found = tuple(np.where(nearer[:, np.newaxis], new, old) for new, old in zip(there, found, strict=True))
     return place[:, 0], place[:, 1], distance
 

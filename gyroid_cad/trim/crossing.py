@@ -8,21 +8,22 @@ is asked for.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.processes import results_of
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.boundary import Boundary, BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.ends import ends_of, halved
-from gyroid_cad.trim.lattice_faces import LatticeFaces, by_number, pairs_of
+from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, by_number, pairs_of
 from gyroid_cad.trim.loops import decided, linked, nested
 from gyroid_cad.trim.nodes import part_nodes, rim_nodes
-from gyroid_cad.trim.paths import closed_paths, open_paths
+from gyroid_cad.trim.paths import Ends, closed_paths, open_paths
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
-from gyroid_cad.trim.section_fit import fitted_sections
+from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["cross_part"]
@@ -35,8 +36,8 @@ Booleans = NDArray[np.bool_]
 _CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 # Points along an edge of an outline, by which holes are told from what is round them.
 _OUTLINE = 9
-# That are told of: nodes of rims and of edges, curves that end and that close, and their splines.
-_STEPS = 5
+# So many pairs of faces are worth a process of their own, and into so many parts they are parted at most.
+_PAIRS, _MOST_PARTS = 250, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,18 +90,61 @@ def cross_part(
     )
     backwards = np.repeat([back for _, back in sides], len(patches)).astype(bool)
     made = Crossing(faces, boundary, pairs_of(faces, boundary), backwards)
-    steps = iter(range(1, _STEPS + 1))
-    work = _Work(made, wall, cell_size, lambda: progress and progress(next(steps), _STEPS))
+    # Steps that are told of: nodes of rims and of edges, and curves of so many parts of the pairs.
+    parts = int(np.clip(len(made.pairs.face) // _PAIRS, 1, _MOST_PARTS))
+    steps = iter(range(1, parts + 3))
+    work = _Work(made, wall, cell_size, parts, lambda: progress and progress(next(steps), parts + 2))
     work.cut_lattice(in_part)
     if in_region is not None:
         work.cut_boundary(in_region, outer)
     return made
 
 
+def _curves(
+    pairs: Pairs, ends: Ends, cell_size: float, first: int, count: int, step_done: Callable[[], object]
+) -> tuple[list[SectionCurve], list[Floats]]:
+    """Curves of all pairs, and points of the nodes they have of their own, numbered from a first one.
+
+    No curve leaves its pair, so that pairs are parted among processes; into as many parts wherever it is done, that the
+    result may be the same.
+    """
+    bounds = [len(pairs.face) * part // count for part in range(count + 1)]
+
+    def found_in(part: int) -> tuple[list[SectionCurve], list[Floats]]:
+        low, high = bounds[part], bounds[part + 1]
+        some = np.flatnonzero((ends.pair >= low) & (ends.pair < high))
+        own = Pairs(pairs.faces, pairs.boundary, pairs.face[low:high], pairs.part[low:high])
+        own_ends = Ends(ends.pair[some] - low, ends.node[some], ends.places[some], ends.near[some], ends.entering[some])
+        return _curves_here(own, own_ends, cell_size, first)
+
+    sections: list[SectionCurve] = []
+    points: list[Floats] = []
+    parts = results_of(found_in, count, "followed curves", done=lambda _: step_done())
+    for part, (found, added) in enumerate(parts):
+        for section in found:
+            start, end = (node + len(points) if node >= first else node for node in (section.start, section.end))
+            sections.append(replace(section, pair=section.pair + bounds[part], start=start, end=end))
+        points += added
+    return sections, points
+
+
+def _curves_here(pairs: Pairs, ends: Ends, cell_size: float, first: int) -> tuple[list[SectionCurve], list[Floats]]:
+    opened = open_paths(pairs, ends)
+    closed, points = halved(closed_paths(pairs, opened), pairs, first)
+    sections: list[SectionCurve] = []
+    for paths in (opened, closed):
+        found, added = fitted_sections(pairs, paths, cell_size, first + len(points))
+        sections += found
+        points += added
+    return sections, points
+
+
 class _Work:
     """Nodes and curves found, and the vertices and edges made of them."""
 
-    def __init__(self, made: Crossing, wall: Wall, cell_size: float, step_done: Callable[[], object]) -> None:
+    def __init__(
+        self, made: Crossing, wall: Wall, cell_size: float, parts: int, step_done: Callable[[], object]
+    ) -> None:
         self.made = made
         complex, faces, pairs = wall.complex, made.faces, made.pairs
         self.rims = faces.side[:, None] * complex.edge_count + complex.patch_edges[faces.patch]
@@ -112,16 +156,8 @@ class _Work:
         step_done()
         self.nodes_of_rim, self.nodes_of_edge = by_number(self.rim_nodes.rim), by_number(self.part_nodes.edge)
         ends, self.coedges = ends_of(pairs, self.rims, self.forward, self.rim_nodes, self.part_nodes)
-        opened = open_paths(pairs, ends)
-        step_done()
         count = len(self.rim_nodes.rim) + len(self.part_nodes.edge)
-        closed, points = halved(closed_paths(pairs, opened), pairs, count)
-        step_done()
-        for paths in (opened, closed):
-            sections, added = fitted_sections(pairs, paths, cell_size, count + len(points))
-            made.sections += sections
-            points += added
-        step_done()
+        made.sections, points = _curves(pairs, ends, cell_size, count, parts, step_done)
         # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
         self.first = len(made.boundary.vertices)
         made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]

@@ -95,7 +95,7 @@ class Pairs:
     part: Integers
 
     def heights(
-        self, pair: Integers, u: Floats, v: Floats, near: Floats | None = None
+        self, pair: Integers, u: Floats, v: Floats, near: Floats | None = None, tangent: bool = False
     ) -> tuple[Floats, Floats, Floats, Floats]:
         """Depths below the part's faces at places of the wall's, how they change, and the places that are nearest.
 
@@ -105,6 +105,8 @@ class Pairs:
         u, v : ndarray, shape (m, q)
         near : ndarray, shape (m, q, 2), optional
             Parameters of the part's faces near those looked for.
+        tangent : bool
+            Whether to measure from the tangent planes there.
 
         Returns
         -------
@@ -121,7 +123,11 @@ class Pairs:
         for part, rows in grouped(self.part[pair]):
             face = self.boundary.faces[part]
             guess = None if near is None else near[rows].reshape(-1, 2)
-            found, gradient, where = face.surface.distances(points[rows].reshape(-1, 3), guess)
+            flat = points[rows].reshape(-1, 3)
+            if tangent and guess is not None:
+                found, gradient, where = face.surface.tangent_distances(flat, guess)
+            else:
+                found, gradient, where = face.surface.distances(flat, guess)
             inwards = -face.sign * gradient.reshape(*points[rows].shape)
             heights[rows] = -face.sign * found.reshape(points[rows].shape[:2])
             places[rows] = face.unwound(where, guess).reshape(*points[rows].shape[:2], 2)

@@ -14,9 +14,10 @@ from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
+from gyroid_cad.trim.free_surfaces import FreeForm, Swept
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve
-from gyroid_cad.trim.surfaces import FreeForm, PartSurface, Quadric, Swept
+from gyroid_cad.trim.surfaces import PartSurface, Quadric
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["PieceMeasures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]

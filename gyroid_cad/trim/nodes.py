@@ -145,8 +145,12 @@ def _may_cross(pairs: Pairs, face: Integers, side: Integers, part: Integers) -> 
     """Mask of the sides that come as near a face of the part as they reach between a few places."""
     points = pairs.faces.along_sides(face, side, np.linspace(-1, 1, _LOOKED_AT))
     reach = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
-    near = np.empty(len(face), dtype=bool)
-    for number, rows in grouped(part):
+    near = np.zeros(len(face), dtype=bool)
+    bottom, top = points.min(axis=1) - reach[:, None], points.max(axis=1) + reach[:, None]
+    low, high = (np.array([getattr(box, name) for box in pairs.boundary.faces])[part] for name in ("low", "high"))
+    boxed = np.flatnonzero(np.all((bottom <= high) & (top >= low), axis=1))
+    for number, some in grouped(part[boxed]):
+        rows = boxed[some]
         found, error = pairs.boundary.faces[number].surface.roughly(points[rows].reshape(-1, 3))
         near[rows] = np.min((np.abs(found) - error).reshape(len(rows), -1), axis=1) <= reach[rows]
     return near
@@ -250,13 +254,13 @@ def _tried(
     for first in range(0, len(face), _AT_ONCE):
         rows = np.arange(first, min(first + _AT_ONCE, len(face)))
         ends = np.stack([low[rows], high[rows]], axis=1)
-        points = _on_edges(boundary, edge[rows], ends)
+        points, _ = _along_edges(boundary, edge[rows], ends)
         heights, _ = _heights(faces, face[rows], points)
         length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         # No place of a segment is further from one of its ends than its length.
         rows = rows[np.abs(heights).min(axis=1) <= length]
         t = low[rows, None] + parts * (high - low)[rows, None]
-        points = _on_edges(boundary, edge[rows], t)
+        points, _ = _along_edges(boundary, edge[rows], t)
         heights, places = _heights(faces, face[rows], points)
         above = heights > 0
         row, index = np.nonzero(above[:, 1:] != above[:, :-1])
@@ -280,13 +284,15 @@ def _between(
     return rows[row], along, place[:, 0], place[:, 1]
 
 
-def _on_edges(boundary: Boundary, edge: Integers, t: Floats) -> Floats:
-    points = np.empty((*t.shape, 3))
+def _along_edges(boundary: Boundary, edge: Integers, t: Floats) -> tuple[Floats, Floats]:
+    """Points of edges (m,) at parameters (m, ...), and their rates of change; each of shape (m, ..., 3)."""
+    points, rates = np.empty((*t.shape, 3)), np.empty((*t.shape, 3))
     for number, rows in grouped(edge):
         curve = boundary.edges[number].curve
         assert curve is not None
-        points[rows] = curve(t[rows].ravel())[0].reshape(*t[rows].shape, 3)
-    return points
+        point, rate, *_ = curve(t[rows].ravel())
+        points[rows], rates[rows] = (some.reshape(points[rows].shape) for some in (point, rate))
+    return points, rates
 
 
 def _heights(faces: LatticeFaces, face: Integers, points: Floats) -> tuple[Floats, Floats]:
@@ -320,33 +326,26 @@ def _converged(
     upwards = np.zeros(len(edge), dtype=bool)
     left = np.zeros((len(edge), 3))
     points = np.zeros((len(edge), 3))
-    for number, rows in grouped(edge):
-        curve = boundary.edges[number].curve
-        assert curve is not None
-        span = boundary.edges[number].last - boundary.edges[number].first
-        for step in range(_NEWTON_STEPS + 1):
-            place, rate, *_ = curve(unknown[rows, 0])
-            point, du, dv = (
-                some[:, 0] for some in faces.derivatives(face[rows], *unknown[rows, 1:, None].transpose(1, 0, 2))
-            )
-            normal = np.cross(du, dv)
-            left[rows], points[rows] = place - point, point
-            slope = dot(rate, normal) / np.maximum(
-                np.linalg.norm(rate, axis=1) * np.linalg.norm(normal, axis=1), np.finfo(float).tiny
-            )
-            sharp[rows], upwards[rows] = np.abs(slope), slope > 0
-            if step == _NEWTON_STEPS:
-                break
-            jacobian = np.stack([rate, -du, -dv], axis=-1)
-            jacobian[np.abs(slope) < 1e-12] = np.eye(3)
-            change = np.linalg.solve(jacobian, -(place - point)[..., None])[..., 0]
-            change[:, 0] = np.clip(change[:, 0], -span / 10, span / 10)
-            change[:, 1:] = np.clip(change[:, 1:], -0.2, 0.2)
-            unknown[rows] += change
-            unknown[rows, 1:] = np.clip(unknown[rows, 1:], -1.3, 1.3)
-            if np.abs(change[:, 1:]).max(initial=0.0) < 1e-14:
-                break
     first, last = (np.array([getattr(boundary.edges[k], name) for k in edge.tolist()]) for name in ("first", "last"))
+    longest = np.stack([(last - first) / 10, np.full(len(edge), 0.2), np.full(len(edge), 0.2)], axis=-1)
+    some = np.arange(len(edge))
+    for step in range(_NEWTON_STEPS + 1):
+        place, rate = _along_edges(boundary, edge[some], unknown[some, 0])
+        u, v = unknown[some, 1:, None].transpose(1, 0, 2)
+        point, du, dv = (value[:, 0] for value in faces.derivatives(face[some], u, v))
+        normal = np.cross(du, dv)
+        left[some], points[some] = place - point, point
+        steepness = np.linalg.norm(rate, axis=1) * np.linalg.norm(normal, axis=1)
+        slope = dot(rate, normal) / np.maximum(steepness, np.finfo(float).tiny)
+        sharp[some], upwards[some] = np.abs(slope), slope > 0
+        if step == _NEWTON_STEPS or not len(some):
+            break
+        jacobian = np.stack([rate, -du, -dv], axis=-1)
+        jacobian[np.abs(slope) < 1e-12] = np.eye(3)
+        change = np.linalg.solve(jacobian, -(place - point)[..., None])[..., 0]
+        unknown[some] += np.clip(change, -longest[some], longest[some])
+        unknown[some, 1:] = np.clip(unknown[some, 1:], -1.3, 1.3)
+        some = some[np.abs(change[:, 1:]).max(axis=1) >= 1e-14]
     t = (unknown[:, 0] - first) / (last - first)
     size = faces.size
     solved = np.linalg.norm(left, axis=1) < 1e-9 * size

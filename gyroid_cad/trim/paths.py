@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.lattice_faces import GRID, Pairs, by_number, grouped
@@ -168,9 +170,11 @@ def _padded(ends: Ends, starts: Integers, stops: Integers) -> Integers:
     return np.where(which < count[:, None], order[index], -1)
 
 
-def _onward(pairs: Pairs, pair: Integers, place: Floats, near: Floats) -> tuple[Floats, Floats, Floats]:
+def _onward(
+    pairs: Pairs, pair: Integers, place: Floats, near: Floats, tangent: bool = False
+) -> tuple[Floats, Floats, Floats]:
     """The unit direction that keeps what lies deeper on its left, and the step of Newton's method to the curve."""
-    height, slopes, where, _ = pairs.heights(pair, place[:, :1], place[:, 1:], near[:, None])
+    height, slopes, where, _ = pairs.heights(pair, place[:, :1], place[:, 1:], near[:, None], tangent)
     slope, height = slopes[:, 0], height[:, 0]
     steepness = np.maximum(np.sum(slope * slope, axis=1), np.finfo(float).tiny)
     turned = np.stack([slope[:, 1], -slope[:, 0]], axis=-1) / np.sqrt(steepness)[:, None]
@@ -186,12 +190,12 @@ def _step(
     near_there = near_half
     moved = np.zeros(len(place))
     for _ in range(3):
-        there, back, near_there = _onward(pairs, pair, tried, near_there)
+        there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
         moved = np.maximum(moved, np.linalg.norm(back, axis=1))
         far = np.linalg.norm(back, axis=1) > length
         back[far] *= (length[far] / np.linalg.norm(back[far], axis=1))[:, None]
         tried = tried + back
-    there, back, near_there = _onward(pairs, pair, tried, near_there)
+    there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
     return tried, there, near_there, (moved < _ASTRAY * length) & (np.linalg.norm(back, axis=1) < 1e-3 * length)
 
 
@@ -249,9 +253,8 @@ def _unexplained(pairs: Pairs, known: Paths) -> tuple[Integers, Floats]:
         above = _above(pairs, rows, points, np.searchsorted(some, pairs.face[rows]))
         mixed = above[:, :-1, :-1]
         changes = (mixed != above[:, 1:, :-1]) | (mixed != above[:, :-1, 1:]) | (mixed != above[:, 1:, 1:])
-        for row in np.flatnonzero(changes.any(axis=(1, 2))).tolist():
-            for path in by_pair.get(int(rows[row]), []):
-                _cross_out(changes[row], known.places[path], step)
+        changes &= _in_boxes(pairs, rows, points, np.searchsorted(some, pairs.face[rows]), changes)
+        changes &= ~_passed(known, rows, by_pair, np.flatnonzero(changes.any(axis=(1, 2))))
         found = np.nonzero(changes)
         cells.append(np.stack([rows[found[0]], *found[1:]], axis=1))
     flat = np.concatenate(cells) if cells else np.zeros((0, 3), dtype=np.int64)
@@ -286,23 +289,40 @@ def _above(pairs: Pairs, rows: Integers, points: Floats, which: Integers) -> Boo
     return above
 
 
-def _cross_out(changes: Booleans, places: Floats, step: float) -> None:
-    """Take away the cells at and beside a path."""
-    dense = _dense(places, step / 2)
-    i, j = (np.clip(((dense[:, axis] + 1) / step).astype(int), 0, GRID - 2) for axis in (0, 1))
-    for di in (-1, 0, 1):
-        for dj in (-1, 0, 1):
-            changes[np.clip(i + di, 0, GRID - 2), np.clip(j + dj, 0, GRID - 2)] = False
+def _in_boxes(pairs: Pairs, rows: Integers, points: Floats, which: Integers, asked: Booleans) -> Booleans:
+    """Mask of the cells, of those asked for, that come into the box of the part's face."""
+    found = np.zeros(asked.shape, dtype=bool)
+    row, i, j = np.nonzero(asked)
+    low, high = (np.array([getattr(face, name) for face in pairs.boundary.faces]) for name in ("low", "high"))
+    part = pairs.part[rows[row]]
+    corners = np.stack([points[which[row], i + di, j + dj] for di in (0, 1) for dj in (0, 1)])
+    bottom, top = corners.min(axis=0), corners.max(axis=0)
+    # Between its corners a cell bulges by less than it is long.
+    margin = np.linalg.norm(top - bottom, axis=1, keepdims=True)
+    found[row, i, j] = np.all((bottom - margin <= high[part]) & (top + margin >= low[part]), axis=1)
+    return found
+
+
+def _passed(known: Paths, rows: Integers, by_pair: dict[int, list[int]], asked: Integers) -> Booleans:
+    """Mask of the cells at and beside known paths, in the rows asked for."""
+    passed = np.zeros((len(rows), GRID - 1, GRID - 1), dtype=bool)
+    step = 2 / (GRID - 1)
+    for row in asked.tolist():
+        paths = by_pair.get(int(rows[row]), [])
+        if paths:
+            dense = np.concatenate([_dense(known.places[path], step / 2) for path in paths])
+            i, j = np.clip(((dense + 1) / step).astype(int), 0, GRID - 2).T
+            passed[row, i, j] = True
+    return np.asarray(binary_dilation(passed, np.ones((1, 3, 3), dtype=bool)))
 
 
 def _dense(places: Floats, step: float = 1 / (GRID - 1)) -> Floats:
-    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    counts = np.maximum(1, np.ceil(lengths / step)).astype(int)
-    parts = [
-        start + (end - start) * np.arange(count)[:, None] / count
-        for start, end, count in zip(places[:-1], places[1:], counts.tolist(), strict=True)
-    ]
-    return np.concatenate([*parts, places[-1:]])
+    along = np.diff(places, axis=0)
+    counts = np.maximum(1, np.ceil(np.linalg.norm(along, axis=1) / step)).astype(int)
+    first = np.cumsum(counts) - counts
+    chord = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(len(chord)) - first[chord]) / counts[chord]
+    return np.concatenate([places[chord] + share[:, None] * along[chord], places[-1:]])
 
 
 def _on_curves(
@@ -315,17 +335,18 @@ def _on_curves(
     at = place.copy()
     back = np.zeros_like(at)
     for _ in range(8):
-        height, slopes, where, _ = pairs.heights(pair, at[:, :1], at[:, 1:], near)
+        height, slopes, where, _ = pairs.heights(pair, at[:, :1], at[:, 1:], near, tangent=True)
         near, back = where, level_step(height, slopes)[:, 0]
         length = np.linalg.norm(back, axis=1)
         at = at + back * np.minimum(1, step / np.maximum(length, step))[:, None]
     assert near is not None
     good = (np.linalg.norm(back, axis=1) < 1e-8) & (np.abs(at).max(axis=1) < 1)
     good &= np.linalg.norm(at - place, axis=1) < 2 * step
-    for row in np.flatnonzero(good).tolist():
-        paths = by_pair.get(int(pair[row]), [])
-        beside = (np.linalg.norm(_dense(known.places[path], step / 4) - at[row], axis=1).min() for path in paths)
-        good[row] = not any(distance < step / 4 for distance in beside)
+    some = np.flatnonzero(good)
+    for number, rows in grouped(pair[some]):
+        if number in by_pair:
+            dense = np.concatenate([_dense(known.places[path], step / 4) for path in by_pair[number]])
+            good[some[rows]] = cKDTree(dense).query(at[some[rows]])[0] >= step / 4
     left = np.flatnonzero(good)
     for part, rows in grouped(pairs.part[pair[left]]):
         good[left[rows]] = pairs.boundary.faces[part].contains(near[left[rows], 0])

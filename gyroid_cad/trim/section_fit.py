@@ -21,7 +21,9 @@ Integers = NDArray[np.int64]
 # Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
 _STATIONS = (8, 16, 32, 64, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
-_NEWTON_STEPS, _CONVERGED = 8, 1e-11
+# Steps of Newton's method; how short the last is in the square, and in parts of the ranges of the part's parameters,
+# where its square is what is left.
+_NEWTON_STEPS, _CONVERGED, _ASIDE = 12, 1e-11, 1e-6
 # So many functions on either side of its own do not vanish at a station that is nearly in its even place.
 _BAND = 4
 # In steps between stations.
@@ -187,17 +189,23 @@ def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) ->
     """Points of stations moved onto the curve, and those stations; the first and last are what they are."""
     stations = stations.copy()
     stations[:, [0, -1]] = ends
-    near = stations[..., 2:]
     points = np.zeros((*stations.shape[:2], 3))
+    ranges = np.array([np.ptp(face.range, axis=0) for face in pairs.boundary.faces])[pairs.part[pair]]
+    left = np.arange(len(pair))
     for _ in range(_NEWTON_STEPS):
-        heights, slopes, near, points = pairs.heights(pair, stations[..., 0], stations[..., 1], near)
+        some = stations[left]
+        heights, slopes, near, points[left] = pairs.heights(pair[left], some[..., 0], some[..., 1], some[..., 2:], True)
         step = level_step(heights, slopes)
         step[:, [0, -1]] = 0
         length = np.linalg.norm(step, axis=-1, keepdims=True)
-        if length.max(initial=0.0) < _CONVERGED:
+        aside = np.abs(near - some[..., 2:]) / ranges[left, None]
+        moving = (length.max(axis=(1, 2)) >= _CONVERGED) | (aside.max(axis=(1, 2)) >= _ASIDE)
+        some[moving, :, :2] += (step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1)))[moving]
+        some[..., 2:] = near
+        stations[left] = some
+        left = left[moving]
+        if not len(left):
             break
-        stations[..., :2] += step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1))
-    stations[..., 2:] = near
     return points, stations
 
 

@@ -39,7 +39,7 @@ def test_what_comes_from_the_other_process_is_what_the_reader_gives(
 ) -> None:
     # Forked or a new Python.
     if system != "linux":
-        monkeypatch.setattr("gyroid_cad.kernel.processes.sys.platform", system)
+        monkeypatch.setattr("gyroid_cad.common.processes.sys.platform", system)
     given, own = read_shape(peg.with_suffix(ending)), read_step(peg)
     assert topology(given) == topology(own)
     assert measure(given) == pytest.approx(measure(own), rel=1e-9)

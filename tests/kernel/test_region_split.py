@@ -20,8 +20,9 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common import processes
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel import processes, region_split, regions
+from gyroid_cad.kernel import region_split, regions
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.part import Part, measure, require_part
@@ -184,11 +185,11 @@ def test_else_all_is_split_at_once(why: str, monkeypatch: pytest.MonkeyPatch) ->
     part, cut, _ = subject("ball")
     told: list[tuple[int, int]] = []
     made = Pieces((), ())
-    monkeypatch.setattr(regions, "ProcessPoolExecutor", fails)
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", fails)
     monkeypatch.setattr(regions, "split", lambda part, faces: made)
     faces = cut[:10] if why == "few faces" else cut
-    processes = 1 if why == "one process" else None
-    assert split_by_region(part, faces, processes, lambda *done: told.append(done)) is made
+    count = 1 if why == "one process" else None
+    assert split_by_region(part, faces, count, lambda *done: told.append(done)) is made
     assert told == [(len(faces), len(faces))]
 
 
@@ -198,13 +199,13 @@ def test_where_no_process_can_be_started_regions_are_split_here_with_the_same_re
 ) -> None:
     part, cut, _ = subject("two balls")
     expected = split_by_region(part, cut, 2)
-    monkeypatch.setattr(regions, "ProcessPoolExecutor", fails)
+    monkeypatch.setattr(processes, "ProcessPoolExecutor", fails)
     if why == "one processor":
         monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     elif why == "another system":
         monkeypatch.setattr(processes.sys, "platform", "darwin")
     else:
-        monkeypatch.setattr(regions.multiprocessing.current_process(), "daemon", True, raising=False)
+        monkeypatch.setattr(processes.multiprocessing.current_process(), "daemon", True, raising=False)
     told: list[tuple[int, int]] = []
     pieces = split_by_region(part, cut, None, lambda *done: told.append(done))
     assert told[-1] == (len(cut), len(cut))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -78,6 +78,7 @@ def cap(u: Floats, v: Floats) -> tuple[Floats, ...]:
     return tuple(np.stack(parts, axis=-1) for parts in vectors)
 
 
+@example(u=0.0, v=0.5, radius=1.0, off_u=0.25, off_v=0.0)
 @given(st.floats(-0.99, 0.99), st.floats(-0.99, 0.99), st.floats(0.5, 3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
 def test_the_nearest_place_of_a_sphere_lies_under_the_point(
     u: float, v: float, radius: float, off_u: float, off_v: float

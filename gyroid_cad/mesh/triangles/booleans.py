@@ -146,13 +146,21 @@ class Body:
         return np.repeat(np.asarray(mesh.run_original_id, dtype=np.int64), np.diff(mesh.run_index) // 3)
 
     def tolerant(self, tolerance: float) -> Body:
-        """The body, of which and of whatever is made with it vertices may be left out that no more than a tolerance
-        in mm tells from their neighbours: those of a cut as it is made, which takes no time.
+        """The body, whose cuts are simplified as they are made: vertices may go that no more than a tolerance tells.
 
+        That takes no time, where simplifying what came out does.
+
+        Parameters
+        ----------
+        tolerance : float
+            In mm.
+
+        Examples
+        --------
         >>> cube = Body(Manifold.cube((2, 2, 2)))
-        >>> dented = cube - cube.moved(np.array([1.0, 1.0, 1.99]))
-        >>> dented.triangle_count, (cube.tolerant(0.1) - cube.moved(np.array([1.0, 1.0, 1.99]))).triangle_count
-        (20, 12)
+        >>> dent = cube.moved(np.array([1.0, 1.0, 1.99]))
+        >>> (cube - dent).triangle_count > (cube.tolerant(0.1) - dent).triangle_count
+        True
         """
         return Body(self.manifold.set_tolerance(tolerance))
 

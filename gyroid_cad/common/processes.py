@@ -1,4 +1,4 @@
-"""Processes beside this one: where they can be forked, what ends them, and work done in one of its own."""
+"""Processes beside this one: where they can be forked, what ends them, and work done in one of its own, or in many."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from io import StringIO
 from multiprocessing.context import ForkProcess
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
-__all__ = ["Started", "can_fork", "interrupts_later", "processors", "settle_in", "started"]
+from gyroid_cad.errors import KernelError
+
+__all__ = ["Started", "can_fork", "processors", "results_of", "started"]
+
+T = TypeVar("T")
 
 # Of prctl(2): the signal that a process gets when the one that started it ends.
 _SET_SIGNAL_AT_PARENTS_END = 1
@@ -55,6 +61,93 @@ def can_fork() -> bool:
 def processors() -> int:
     """Count the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def results_of(
+    work: Callable[[int], T],
+    count: int,
+    aim: str,
+    processes: int | None = None,
+    done: Callable[[int], object] = lambda number: None,
+) -> list[T]:
+    """Results of a function for each of so many numbers, several at a time in forked processes where that can be.
+
+    What the function reaches is not sent: a forked process has it already. What it returns is.
+
+    Parameters
+    ----------
+    work : callable
+        From a number below ``count`` to its result.
+    count : int
+    aim : str
+        What the work is to do, for messages, as in "a process that ... ended too soon".
+    processes : int, optional
+        As many as there are processors to run on, if left out; with 1 all is done here.
+    done : callable, optional
+        Called with each number once its result is there.
+
+    Raises
+    ------
+    KernelError
+        If a process ends before its work, or cannot be started.
+
+    Examples
+    --------
+    >>> results_of(lambda number: number**2, 4, "squared numbers")
+    [0, 1, 4, 9]
+    """
+    usable = min(processors() if processes is None else processes, count)
+    if usable > 1 and can_fork():
+        return _results_in_processes(work, count, aim, usable, done)
+    results = []
+    for number in range(count):
+        results.append(work(number))
+        done(number)
+    return results
+
+
+def _results_in_processes(
+    work: Callable[[int], T], count: int, aim: str, processes: int, done: Callable[[int], object]
+) -> list[T]:
+    before = multiprocessing.active_children()
+    executor = ProcessPoolExecutor(
+        processes, multiprocessing.get_context("fork"), initializer=_begin, initargs=(work, os.getpid())
+    )
+    try:
+        with interrupts_later():
+            futures = {executor.submit(_inherited_work, number): number for number in range(count)}
+        for future in as_completed(futures):
+            future.result()
+            done(futures[future])
+        return [future.result() for future in futures]
+    except BrokenProcessPool as broken:
+        raise KernelError(f"a process that {aim} ended too soon") from broken
+    except BaseException as problem:
+        # Nobody waits for what they are at; and if not all could be started, the others would wait for ever.
+        for process in multiprocessing.active_children():
+            if process not in before:
+                process.kill()
+                process.join()
+        if isinstance(problem, RuntimeError | OSError) and not isinstance(problem, KernelError):
+            raise KernelError(f"no processes that {aim} could be started: {problem}") from problem
+        raise
+    finally:
+        # If none could be started there is no thread of the pool's to wait for.
+        with suppress(RuntimeError):
+            executor.shutdown(cancel_futures=True)
+
+
+# What a process was started for.
+_inherited: list[Callable[[int], Any]] = []
+
+
+def _begin(work: Callable[[int], Any], parent: int) -> None:
+    settle_in(parent)
+    _inherited.append(work)
+
+
+def _inherited_work(number: int) -> Any:
+    return _inherited[-1](number)
 
 
 class _Forked:

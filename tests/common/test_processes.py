@@ -10,7 +10,7 @@ from pathlib import Path
 import errands
 import pytest
 
-from gyroid_cad.kernel.processes import can_fork, started
+from gyroid_cad.common.processes import can_fork, started
 
 PATIENCE = 60.0
 Captured = pytest.CaptureFixture[str]

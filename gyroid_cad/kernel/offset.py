@@ -48,7 +48,7 @@ Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 _TOLERANCE = 1e-5
 # The kernel's own ways are quick where they work at all; those that are not crash or do not end.
 _SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _SECONDS_BETWEEN_LOOKS = 60.0, 5.0, 0.02
-_PIECES, _PIECES_TO_OPENINGS = "pieces", "pieces to openings"
+_OF_PIECES = _PIECES, _PIECES_TO_OPENINGS = "pieces", "pieces to openings"
 # Faces that are bent alike all over, to rounding, do not fold: they vanish.
 _SAME_RADIUS = 1e-3
 _SOLID, _REASON = "solid.bin", "reason.txt"
@@ -85,6 +85,8 @@ def offsets(
                 while left and (found := _awaited(process, Path(folder, left[0]))):
                     left.pop(0)
                     yield _read(found) if found.stat().st_size else None
+                if left and left[0] in _OF_PIECES and reasons is not None and process.wait(0) is None:
+                    reasons.append(f"its faces' offsets were not cut against each other in {_SECONDS_AT_MOST:g} s")
             finally:
                 process.kill()
             if left:
@@ -96,9 +98,7 @@ def offsets(
 
 def _awaited(process: Started, path: Path) -> Path | None:
     """The path once there is a file; None if the process ends before, or takes too long."""
-    at_most = (
-        _SECONDS_AT_MOST if path.name in (_PIECES, _PIECES_TO_OPENINGS) else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
-    )
+    at_most = _SECONDS_AT_MOST if path.name in _OF_PIECES else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
     end = time.monotonic() + at_most
     while not path.exists():
         ended = process.wait(_SECONDS_BETWEEN_LOOKS) is not None

@@ -9,13 +9,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.free_surfaces import FreeForm, Swept
-from gyroid_cad.trim.lattice_faces import grouped
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve
 from gyroid_cad.trim.sections import on_section
@@ -187,7 +186,7 @@ class _Samples:
     def __init__(self, face: BoundaryFace, middle: Floats) -> None:
         self.low, high = face.range
         self.scale = (high - self.low) / 2
-        self.quadrature = SquareQuadrature(self._knots(face.surface))
+        self.quadrature = _quadrature(self._knots(face.surface).tobytes())
         nodes = self.quadrature.places
         grid = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
         places = self.low + self.scale * (grid + 1)
@@ -212,6 +211,12 @@ class _Samples:
     def over(self, places: Floats, rates: Floats) -> Floats:
         square = np.clip((places - self.low) / self.scale - 1, -1, 1)
         return self.quadrature.over(square, rates / self.scale[1], self.density)
+
+
+@lru_cache(maxsize=8)
+def _quadrature(knots: bytes) -> SquareQuadrature:
+    """Most faces have the same knots: those of planes, or of quadrics."""
+    return SquareQuadrature(np.frombuffer(knots))
 
 
 def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:

@@ -182,9 +182,15 @@ class Build:
 
 
 def write_shape(
-    shape: KernelShape, size: ShapeSize, path: Path, schema: Schema, deviation: float, angle: float
+    shape: KernelShape,
+    size: ShapeSize,
+    path: Path,
+    schema: Schema,
+    deviation: float,
+    angle: float,
+    names: Sequence[str] = (),
 ) -> None:
-    """Write a shape, whose size is known, in the format of the path's ending.
+    """Write a shape, whose size is known, and what its solids are called, in the format of the path's ending.
 
     Raises
     ------
@@ -193,7 +199,7 @@ def write_shape(
 
     form = format_of(path)
     if form is STEP:
-        write_step(shape, path, schema, size=size)
+        write_step(shape, path, schema, size=size, body_names=names)
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:

@@ -161,17 +161,17 @@ class Filled(HostShapes):
         >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
         >>> filled.write("light.step", "light.stl", deviation=0.1)
         """
-        targets = require_formats(paths)
-        limit = self.deviation(deviation)
+        targets, limit = require_formats(paths), self.deviation(deviation)
         require_settings((1, 1, 1), schema, limit, angle)
         for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
             if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
         size = ShapeSize(self.report.volume, self.report.area)
+        names = [name for name, shape in self.domains.items() for _ in range(topology(shape).solids)]
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), size, path, schema, limit, angle)
+                write_shape(self.solid(), size, path, schema, limit, angle, names)
 
 
 def fill(

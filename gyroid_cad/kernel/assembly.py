@@ -26,7 +26,7 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
 from gyroid_cad.kernel.step import product_name, reading_step, write_parts
 from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart
-from gyroid_cad.kernel.step_solids import read_solids
+from gyroid_cad.kernel.step_solids import read_step_bodies
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 
@@ -102,7 +102,9 @@ def write_assembly(
     product = product_name(path, name)
     require_schema(schema)
     names, colours = [named.name for named in part.faces], [named.colour for named in part.faces]
-    written = StepPart(part.name, read_solids(part.shape), part.colour, names, colours, part.size)
+    written = StepPart(
+        part.name, read_step_bodies(part.shape), part.colour, face_names=names, face_colours=colours, size=part.size
+    )
     occurrences = [Occurrence(0, called, (place, *_AXES)) for called, place in places]
     whole = ShapeSize(len(occurrences) * part.size.volume, len(occurrences) * part.size.area)
     write_parts(part.shape, path, schema, product, [written], occurrences, whole)

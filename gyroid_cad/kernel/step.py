@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from threading import RLock
 from types import MappingProxyType
-from typing import TextIO
 
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.IFSelect import IFSelect_RetDone
@@ -43,9 +44,11 @@ __all__ = [
     "write_step",
 ]
 
-_KIND = re.compile(r"#\d+\s*=\s*(\w+)\s*\(")
-_USE = re.compile(r"#\d+\s*=\s*ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+)")
-_COUNTED = ("MANIFOLD_SOLID_BREP", "BREP_WITH_VOIDS", "ADVANCED_FACE", "FACE_SURFACE")
+# Entities that count, each from its line's beginning: the kernel's writer folds lines, and has blanks.
+_COUNTED = re.compile(
+    rb"\n#\d+\s*=\s*(?:(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|ADVANCED_FACE|FACE_SURFACE)\s*\("
+    rb"|ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+))"
+)
 
 
 def topology_in_step(path: str | os.PathLike[str]) -> Topology:
@@ -54,18 +57,13 @@ def topology_in_step(path: str | os.PathLike[str]) -> Topology:
     No kernel is asked, so that what its writer left out is seen. A face is an ``ADVANCED_FACE`` (ISO 10303-511),
     and an edge is used by each ``ORIENTED_EDGE`` that names it.
     """
-    counts = dict.fromkeys(_COUNTED, 0)
-    uses: dict[str, int] = {}
-    with open(path, encoding="utf-8", errors="replace") as lines:
-        for entity in _entities(lines):
-            if use := _USE.match(entity):
-                uses[use[1]] = uses.get(use[1], 0) + 1
-            elif (kind := _KIND.match(entity)) and kind[1] in counts:
-                counts[kind[1]] += 1
+    with open(path, "rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as text:
+        found = Counter(match.group(1, 2) for match in _COUNTED.finditer(text))
+    kinds = Counter({kind: count for (kind, _), count in found.items() if kind})
     return Topology(
-        solids=counts["MANIFOLD_SOLID_BREP"] + counts["BREP_WITH_VOIDS"],
-        faces=counts["ADVANCED_FACE"] + counts["FACE_SURFACE"],
-        open_edges=sum(count != 2 for count in uses.values()),
+        solids=kinds[b"MANIFOLD_SOLID_BREP"] + kinds[b"BREP_WITH_VOIDS"],
+        faces=kinds[b"ADVANCED_FACE"] + kinds[b"FACE_SURFACE"],
+        open_edges=sum(count != 2 for (kind, _), count in found.items() if not kind),
     )
 
 
@@ -77,7 +75,7 @@ def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Sh
     whole = solids <= found.solids <= wanted.solids and faces <= found.faces <= wanted.faces
     if not whole or found.open_edges > wanted.open_edges:
         raise ExportError(
-            f"{path} was not written: the kernel's STEP writer gave {found.solids} of {wanted.solids} solids, "
+            f"{path} was not written: its text held {found.solids} of {wanted.solids} solids, "
             f"{found.faces} of {wanted.faces} faces and {found.open_edges} open edges; BREP holds the shape as it is"
         )
 
@@ -90,17 +88,6 @@ def _counted_once(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> int:
     return int(parts.Extent())
 
 
-def _entities(lines: TextIO) -> Iterator[str]:
-    """Whole entities, each with its folded lines."""
-    pending = ""
-    for line in lines:
-        pending += line
-        if line.endswith(";\n"):
-            yield pending
-            pending = ""
-    yield pending
-
-
 # A host that wrote a file in inches leaves the kernel taking all lengths of shapes for inches.
 _OF_LENGTHS: Mapping[str, str | int] = MappingProxyType({"xstep.cascade.unit": "MM"})
 
@@ -111,13 +98,14 @@ def write_step(
     schema: Schema = "ap214",
     name: str | None = None,
     size: ShapeSize | None = None,
+    body_names: Sequence[str] = (),
 ) -> None:
     """Write a shape in millimetres.
 
-    Solids whose geometry STEP has words for are written from arrays, with what faces and edges have in common once,
-    and without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so
-    that readers find those curves again, and files are a third smaller. Of anything else, such as an offset surface,
-    a face of no solid or a mirrored copy, the kernel's own writer makes the file, with these curves.
+    Solids or shells of known geometry are written from arrays, with what faces and edges have in common once, and
+    without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so that
+    readers find those curves again, and files are over a quarter smaller. Of anything else, such as an offset surface,
+    a loose face or a mirrored copy, the kernel's own writer makes the file, with these curves.
 
     Parameters
     ----------
@@ -129,6 +117,8 @@ def write_step(
         Of the product; the file's stem if left out.
     size : ShapeSize, optional
         For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
+    body_names : sequence of str
+        One a solid, as the kernel counts them, or none; left out likewise.
 
     Raises
     ------
@@ -136,7 +126,7 @@ def write_step(
     """
     product, kernel_schema = product_name(path, name), require_schema(schema)
     try:
-        parts, places = products_of(shape, product)
+        parts, places = products_of(shape, product, body_names)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, kernel_schema, product)
     else:

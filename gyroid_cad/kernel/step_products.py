@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from OCP.TopAbs import TopAbs_FORWARD, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FORWARD
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
@@ -17,7 +17,7 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import AxisPlacement, axis_placement
-from gyroid_cad.kernel.step_solids import LEAST_GAP, StepSolid, read_solids, require_solids
+from gyroid_cad.kernel.step_solids import LEAST_GAP, StepBody, read_step_bodies, require_bodies
 from gyroid_cad.kernel.step_text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
 
@@ -54,7 +54,7 @@ class ShapeSize:
     Attributes
     ----------
     volume, area : float
-        In mm3 and mm2, of all its solids.
+        In mm3 and mm2, of all its bodies; shells have no volume.
     """
 
     volume: float
@@ -63,22 +63,25 @@ class ShapeSize:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepPart:
-    """A part of one or several solids.
+    """A part of one or several bodies, all of one kind.
 
     Attributes
     ----------
     name : str
-    solids : sequence of StepSolid
+    bodies : sequence of StepBody
     colour : str
         By which STEP knows it; that of the file's reader if left out.
+    body_names : sequence of str
+        One a body, or none.
     face_names, face_colours : sequence of str
         One a face, as the kernel counts them, or none.
     size : ShapeSize, optional
     """
 
     name: str
-    solids: Sequence[StepSolid]
+    bodies: Sequence[StepBody]
     colour: str = ""
+    body_names: Sequence[str] = ()
     face_names: Sequence[str] = ()
     face_colours: Sequence[str] = ()
     size: ShapeSize | None = None
@@ -122,7 +125,7 @@ def write_products(
     size : ShapeSize, optional
         Of all of it, for receivers to compare what they find with.
     """
-    extent = max(solid.extent for part in parts for solid in part.solids)
+    extent = max(body.extent for part in parts for body in part.bodies)
     with path.open("w", encoding="ascii", newline="\n") as out:
         out.write(_header(name, schema))
         text = StepText(out, extent)
@@ -133,7 +136,9 @@ def write_products(
         out.write("ENDSEC;\nEND-ISO-10303-21;\n")
 
 
-def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Occurrence]]:
+def products_of(
+    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = ()
+) -> tuple[list[StepPart], list[Occurrence]]:
     """Return the parts that a shape is written as, and their places if it has a solid in several.
 
     Parameters
@@ -141,18 +146,19 @@ def products_of(shape: TopoDS_Shape, name: str) -> tuple[list[StepPart], list[Oc
     shape : TopoDS_Shape
     name : str
         Of the product.
+    body_names : sequence of str
+        One a body, as the kernel counts them, or none.
 
     Raises
     ------
     UnknownGeometryError
     """
-    kinds, solids = NumberedShapes(), list(parts_of(shape, TopAbs_SOLID))
-    which = [kinds.Add(solid.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for solid in solids]
-    if len(solids) == kinds.Extent():
-        return [StepPart(name, read_solids(shape))], []
-    require_solids(shape)
-    parts = [StepPart(f"{name} {kind}", read_solids(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
-    places = [axis_placement(solid.Location()) for solid in solids]
+    kinds, bodies = NumberedShapes(), list(parts_of(shape, require_bodies(shape)))
+    which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
+    if len(bodies) == kinds.Extent():
+        return [StepPart(name, read_step_bodies(shape), body_names=body_names)], []
+    parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
+    places = [axis_placement(body.Location()) for body in bodies]
     return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
 
 
@@ -195,7 +201,7 @@ class _Products:
     def assembly(self, name: str, parts: Sequence[StepPart], occurrences: Sequence[Occurrence]) -> _Product:
         assembly = self._product(name)
         places = [self.text.frame(*one.frame) for one in occurrences]
-        assembly.context = self._context(max(solid.gap for part in parts for solid in part.solids))
+        assembly.context = self._context(max(body.gap for part in parts for body in part.bodies))
         items = refs(dict.fromkeys([self.text.frame(*_HOME), *places]))
         assembly.representation = self.text.add(f"SHAPE_REPRESENTATION('',{items},#{assembly.context})")
         self._define(assembly)
@@ -216,11 +222,12 @@ class _Products:
 
     def part(self, part: StepPart, name: str) -> _Product:
         product = self._product(name)
-        names = iter(part.face_names)
-        numbers = [solid.write(self.text, names) for solid in part.solids]
-        product.context = self._context(max(solid.gap for solid in part.solids))
-        items = refs([self.text.frame(*_HOME), *(solid for solid, _ in numbers)])
-        product.representation = self.text.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',{items},#{product.context})")
+        names, face_names = iter(part.body_names), iter(part.face_names)
+        numbers = [body.write(self.text, next(names, ""), face_names) for body in part.bodies]
+        product.context = self._context(max(body.gap for body in part.bodies))
+        items = refs([self.text.frame(*_HOME), *(body for body, _ in numbers)])
+        kind = "ADVANCED_BREP" if part.bodies[0].solid else "MANIFOLD_SURFACE"
+        product.representation = self.text.add(f"{kind}_SHAPE_REPRESENTATION('',{items},#{product.context})")
         self._define(product)
         if part.colour:
             self._colour(part, numbers, product.context)
@@ -231,10 +238,12 @@ class _Products:
     def validate(self, product: _Product, size: ShapeSize) -> None:
         """Say how large a product is."""
         add, once = self.text.add, self.text.once
-        for name, item, measure, power in _VALIDATED:
-            value = real(float(f"{size.area if power == 2 else size.volume:.{_DIGITS}g}"))
+        for (name, item, measure, power), value in zip(_VALIDATED, (size.volume, size.area), strict=True):
+            if not value:
+                continue
+            shown = real(float(f"{value:.{_DIGITS}g}"))
             unit = once(f"DERIVED_UNIT({refs([once(f'DERIVED_UNIT_ELEMENT(#{self._millimetre()},{power}.)')])})")
-            measured = add(f"MEASURE_REPRESENTATION_ITEM('{item}',{measure}_MEASURE({value}),#{unit})")
+            measured = add(f"MEASURE_REPRESENTATION_ITEM('{item}',{measure}_MEASURE({shown}),#{unit})")
             representation = add(f"REPRESENTATION('{name}',(#{measured}),#{product.context})")
             defined = add(f"PROPERTY_DEFINITION('geometric validation property','{name}',#{product.shape})")
             add(f"PROPERTY_DEFINITION_REPRESENTATION(#{defined},#{representation})")

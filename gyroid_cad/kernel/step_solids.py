@@ -1,4 +1,4 @@
-"""Solids as STEP has them: the kernel's topology walked once, and written with what faces and edges share once."""
+"""Solids and shells as STEP has them: the topology walked once, and written with what faces and edges share once."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from OCP.TopAbs import (
     TopAbs_FACE,
     TopAbs_FORWARD,
     TopAbs_REVERSED,
+    TopAbs_ShapeEnum,
     TopAbs_SHELL,
     TopAbs_SOLID,
     TopAbs_WIRE,
@@ -29,7 +30,7 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid,
 from gyroid_cad.kernel.step_geometry import Geometries, Placed, Spline, Triple, UnknownGeometryError
 from gyroid_cad.kernel.step_text import StepText, flag, quoted, refs
 
-__all__ = ["LEAST_GAP", "StepSolid", "read_solids", "require_solids"]
+__all__ = ["LEAST_GAP", "StepBody", "read_step_bodies", "require_bodies"]
 
 # In mm: the kernel's smallest distance, which no tolerance is below.
 LEAST_GAP = 1e-7
@@ -56,8 +57,8 @@ class _Face:
 
 
 @dataclass(slots=True)
-class StepSolid:
-    """A solid, read from the kernel.
+class StepBody:
+    """A solid, or a shell that bounds none, read from the kernel.
 
     Attributes
     ----------
@@ -69,6 +70,7 @@ class StepSolid:
     shells : list of list of faces
     outer : int
         Which of them is not round a void.
+    solid : bool
     """
 
     gap: float = 0.0
@@ -78,6 +80,7 @@ class StepSolid:
     edges: list[tuple[int, int, int]] = field(default_factory=list)
     shells: list[list[_Face]] = field(default_factory=list)
     outer: int = 0
+    solid: bool = True
 
     @property
     def extent(self) -> float:
@@ -86,18 +89,19 @@ class StepSolid:
         places = [np.array(self.vertices), *(one.poles for one in splines)]
         return max(float(np.abs(some).max()) for some in places)
 
-    def write(self, text: StepText, face_names: Iterator[str]) -> tuple[int, list[int]]:
-        """Write the solid.
+    def write(self, text: StepText, name: str, face_names: Iterator[str]) -> tuple[int, list[int]]:
+        """Write the body.
 
         Parameters
         ----------
         text : StepText
+        name : str
         face_names : iterator of str
             One a face, as the kernel counts them, or none.
 
         Returns
         -------
-        solid : int
+        body : int
             Number of its entity.
         faces : list of int
             Numbers of its faces, as the kernel counts them.
@@ -120,13 +124,15 @@ class StepSolid:
                 turned = isinstance(surface, Placed) and surface.left_handed
                 rest = f"{refs(bounds)},#{geometries[face.surface]},{flag(face.forward != turned)}"
                 numbers.append(text.add(f"ADVANCED_FACE({quoted(next(face_names, ''))},{rest})"))
-            shells.append(text.add(f"CLOSED_SHELL('',{refs(numbers)})"))
+            shells.append(text.add(f"{'CLOSED' if self.solid else 'OPEN'}_SHELL('',{refs(numbers)})"))
             faces += numbers
+        if not self.solid:
+            return text.add(f"SHELL_BASED_SURFACE_MODEL({quoted(name)},{refs(shells)})"), faces
         outer = shells.pop(self.outer)
         if not shells:
-            return text.add(f"MANIFOLD_SOLID_BREP('',#{outer})"), faces
+            return text.add(f"MANIFOLD_SOLID_BREP({quoted(name)},#{outer})"), faces
         voids = text.add_all(f"ORIENTED_CLOSED_SHELL('',*,#{shell},.F.)" for shell in shells)
-        return text.add(f"BREP_WITH_VOIDS('',#{outer},{refs(voids)})"), faces
+        return text.add(f"BREP_WITH_VOIDS({quoted(name)},#{outer},{refs(voids)})"), faces
 
     def _bound(self, text: StepText, loop: _Loop, vertices: range, edges: range, forward: bool) -> int:
         if loop.vertex is not None:
@@ -137,40 +143,43 @@ class StepSolid:
         return text.add(f"FACE_BOUND('',#{border},{flag(forward)})")
 
 
-def read_solids(shape: TopoDS_Shape) -> list[StepSolid]:
-    """Read the solids of a shape, each with edges and vertices of its own.
+def read_step_bodies(shape: TopoDS_Shape) -> list[StepBody]:
+    """Read the solids of a shape, or its shells if it has none, each with edges and vertices of its own.
 
     Raises
     ------
     UnknownGeometryError
         If it holds anything that is not known here.
     """
-    require_solids(shape)
-    return [_Reading(solid).read for solid in parts_of(shape, TopAbs_SOLID)]
+    return [_Reading(body).read for body in parts_of(shape, require_bodies(shape))]
 
 
-def require_solids(shape: TopoDS_Shape) -> None:
-    """Check that a shape is solids and nothing else.
+def require_bodies(shape: TopoDS_Shape) -> TopAbs_ShapeEnum:
+    """Check that a shape is solids and nothing else, or open shells and nothing else; returns which.
 
     Raises
     ------
     UnknownGeometryError
     """
-    strays = (TopExp_Explorer(shape, TopAbs_FACE, TopAbs_SOLID), TopExp_Explorer(shape, TopAbs_EDGE, TopAbs_FACE))
-    if not TopExp_Explorer(shape, TopAbs_SOLID).More() or any(explorer.More() for explorer in strays):
-        raise UnknownGeometryError("faces or edges of no solid")
+    kind = TopAbs_SOLID if TopExp_Explorer(shape, TopAbs_SOLID).More() else TopAbs_SHELL
+    strays = (TopExp_Explorer(shape, TopAbs_FACE, kind), TopExp_Explorer(shape, TopAbs_EDGE, TopAbs_FACE))
+    if not TopExp_Explorer(shape, kind).More() or any(explorer.More() for explorer in strays):
+        raise UnknownGeometryError("faces or edges of no body")
+    if kind == TopAbs_SHELL and any(BRep_Tool.IsClosed_s(shell) for shell in parts_of(shape, TopAbs_SHELL)):
+        raise UnknownGeometryError("a closed shell of no solid")
+    return kind
 
 
 class _Reading:
-    """The walk through a solid."""
+    """The walk through a body."""
 
-    def __init__(self, solid: TopoDS_Shape) -> None:
-        self.read = StepSolid()
+    def __init__(self, body: TopoDS_Shape) -> None:
+        self.read = StepBody(solid=body.ShapeType() == TopAbs_SOLID)
         self._edges, self._vertices = NumberedShapes(), NumberedShapes()
         self._meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]] = []
         # A solid is what its outer shell holds; that the kernel has it inside out is not for STEP to say.
-        whole = solid.Oriented(TopAbs_FORWARD)
-        shells = _children(whole)
+        whole = body.Oriented(TopAbs_FORWARD)
+        shells = _children(whole) if self.read.solid else [whole]
         if any(shell.ShapeType() != TopAbs_SHELL for shell in shells):
             raise UnknownGeometryError("a solid with more than shells")
         if len(shells) > 1:
@@ -223,15 +232,20 @@ class _Reading:
     def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:
         along, known = _along(edge), self._edges.Extent()
         number = int(self._edges.Add(edge))
-        self._meetings.append((BRep_Tool.Tolerance_s(edge), edge, face))
+        self._meet(BRep_Tool.Tolerance_s(edge), edge, face)
         if number > known:
             forward = as_edge(edge.Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
             curve = self.read.curves.number(BRep_Tool.Curve_s(forward, location, 0.0, 0.0), location)
             ends = TopExp.FirstVertex_s(forward), TopExp.LastVertex_s(forward)
             self.read.edges.append((self._vertex(ends[0]), self._vertex(ends[1]), curve))
-            self._meetings += [(BRep_Tool.Tolerance_s(end), edge, end) for end in ends]
+            for end in ends:
+                self._meet(BRep_Tool.Tolerance_s(end), edge, end)
         return number - 1, along
+
+    def _meet(self, tolerance: float, edge: TopoDS_Edge, other: TopoDS_Face | TopoDS_Vertex) -> None:
+        if tolerance > LEAST_GAP:
+            self._meetings.append((tolerance, edge, other))
 
     def _vertex(self, vertex: TopoDS_Vertex) -> int:
         if vertex.IsNull():
@@ -254,7 +268,7 @@ def _largest_gap(meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_V
     """
     largest = 0.0
     for tolerance, edge, other in sorted(meetings, key=lambda meeting: -meeting[0]):
-        if tolerance <= max(largest, LEAST_GAP):
+        if tolerance <= largest:
             break
         curve = BRepAdaptor_Curve(edge)
         first, last = curve.FirstParameter(), curve.LastParameter()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import TextIO
 
 import numpy as np
@@ -27,6 +27,7 @@ _MOST_DECIMALS = 15
 _DIRECTION_DECIMALS = 15
 # Points whose text is made at once.
 _BLOCK = 20_000
+_POINT = "#%d=CARTESIAN_POINT('',(%s,%s,%s));\n"
 
 
 class StepText:
@@ -86,9 +87,12 @@ class StepText:
         values, coordinates = np.unique(np.round(places, self._decimals) + 0.0, return_inverse=True)
         coordinates = coordinates.reshape(-1, 3)
         kept, which = _distinct_rows(coordinates, len(values)) if shared else (coordinates, np.arange(len(places)))
-        texts = np.array([real(value) for value in values.tolist()], dtype=object)
-        numbers = self.add_all(_points(kept, texts))
-        return (which + numbers.start).tolist() if len(places) else []
+        texts, first = [real(value) for value in values.tolist()], self._last + 1
+        self._last += len(kept)
+        for start in range(0, len(kept), _BLOCK):
+            x, y, z = (map(texts.__getitem__, column.tolist()) for column in kept[start : start + _BLOCK].T)
+            self._out.writelines(map(_POINT.__mod__, zip(count(first + start), x, y, z, strict=False)))
+        return (which + first).tolist() if len(places) else []
 
     def direction(self, way: Triple) -> int:
         x, y, z = (real(round(part, _DIRECTION_DECIMALS) + 0.0) for part in way)
@@ -176,12 +180,6 @@ def flag(value: bool) -> str:
     '.T.'
     """
     return ".T." if value else ".F."
-
-
-def _points(rows: Integers, texts: NDArray[np.object_]) -> Iterator[str]:
-    for start in range(0, len(rows), _BLOCK):
-        for x, y, z in texts[rows[start : start + _BLOCK]].tolist():
-            yield f"CARTESIAN_POINT('',({x},{y},{z}))"
 
 
 def _distinct_rows(rows: Integers, count: int) -> tuple[Integers, Integers]:

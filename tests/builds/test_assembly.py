@@ -82,8 +82,9 @@ def colour_of(label: TDF_Label) -> str:
 def read_assembly(path: Path) -> ReadBack:
     document = TDocStd_Document(TCollection_ExtendedString("BinXCAF"))
     XCAFApp_Application.GetApplication_s().InitDocument(document)
-    Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)
+    # The first reader of a process registers the settings.
     reader = STEPCAFControl_Reader()
+    assert Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)
     assert reader.ReadFile(str(path)) == IFSelect_RetDone
     assert reader.Transfer(document)
     roots, components = LabelSequence(), LabelSequence()

@@ -11,11 +11,13 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TDF import TDF_Label
+from OCP.TopAbs import TopAbs_SOLID
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool, XCAFDoc_Volume
 
 from gyroid_cad.common.formats import SCHEMAS
 from gyroid_cad.filling.fill import fill
-from gyroid_cad.kernel.assembly import new_document
+from gyroid_cad.kernel.assembly import new_document, read_bodies
+from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
 from gyroid_cad.kernel.step import write_step
 from gyroid_cad.lattice import Lattice
@@ -88,3 +90,15 @@ def test_properties_are_named_as_the_practice_has_them_and_measured_in_cubic_and
 def test_of_a_shape_whose_size_nobody_gave_nothing_is_said(cell: Lattice, tmp_path: Path) -> None:
     write_step(cell.solid(), tmp_path / "a.step")
     assert "validation" not in (tmp_path / "a.step").read_text()
+
+
+def test_solids_of_a_filled_part_bear_the_names_of_their_domains(tmp_path: Path) -> None:
+    made = fill(BRepPrimAPI_MakeBox(4, 4, 4).Shape(), 8.0, density=0.3, kind="channels", fit=COARSE)
+    made.write(tmp_path / "a.step")
+    _, names = read_bodies(tmp_path / "a.step")
+    assert [name for _, name in names] == [name for name, shape in made.domains.items() for _ in solids_in(shape)]
+    assert {name for _, name in names} == {"channel-a", "channel-b"}
+
+
+def solids_in(shape: Any) -> Any:
+    return parts_of(shape, TopAbs_SOLID)

@@ -310,7 +310,7 @@ class Boundary:
 
     @cached_property
     def _lines(self) -> tuple[Booleans, Floats, Floats]:
-        """Which edges are straight lines, their origins and directions."""
+        """A mask of the edges that are straight lines, their origins and directions."""
         mask, both = np.zeros(len(self.edges), dtype=bool), np.zeros((2, len(self.edges), 3))
         for number, edge in enumerate(self.edges):
             if isinstance(edge.curve, StraightLine):
@@ -318,7 +318,7 @@ class Boundary:
         return mask, both[0], both[1]
 
     def _flat_and_others(self, face: Integers) -> tuple[Integers, list[tuple[int, Integers]]]:
-        """Where faces are planes, which are asked all at once; and the others, by number."""
+        """Positions of planes, which are asked all at once; and those of the others, by number."""
         flat = self._planes[0][face]
         others = np.flatnonzero(~flat)
         return np.flatnonzero(flat), [(number, others[some]) for number, some in grouped(face[others])]
@@ -332,7 +332,7 @@ class Boundary:
 
     @cached_property
     def _planes(self) -> tuple[Booleans, Floats, Floats, Floats]:
-        """Which faces are planes, their origins and axes, and 1 where the third of these points inwards, else -1."""
+        """A mask of the faces that are planes, their origins and axes, and 1 where the third axis points inwards, else -1."""
         mask, inwards = np.zeros(len(self.faces), dtype=bool), np.ones(len(self.faces))
         origins, axes = np.zeros((len(self.faces), 3)), np.zeros((len(self.faces), 3, 3))
         for number, face in enumerate(self.faces):

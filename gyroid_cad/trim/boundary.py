@@ -332,7 +332,7 @@ class Boundary:
 
     @cached_property
     def _planes(self) -> tuple[Booleans, Floats, Floats, Floats]:
-        """A mask of the faces that are planes, their origins and axes, and 1 where the third axis points inwards, else -1."""
+        """A mask of the faces that are planes, their origins and axes, and 1 where the third axis points inwards."""
         mask, inwards = np.zeros(len(self.faces), dtype=bool), np.ones(len(self.faces))
         origins, axes = np.zeros((len(self.faces), 3)), np.zeros((len(self.faces), 3, 3))
         for number, face in enumerate(self.faces):

@@ -1,4 +1,4 @@
-"""Arrays that cannot be written to, and products of many vectors at once."""
+"""Arrays that cannot be written to, products of many vectors at once, and what has the same number."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Point", "cross", "dot", "freeze_arrays", "numbered_groups", "unit"]
+__all__ = ["Point", "by_number", "cross", "dot", "freeze_arrays", "grouped", "numbered_groups", "unit"]
 
 # As users give it, and reports tell it.
 Point = tuple[float, float, float]
@@ -58,3 +58,28 @@ def numbered_groups(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArr
     """
     group = np.repeat(np.arange(len(counts)), counts)
     return group, np.arange(len(group)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def grouped(numbers: NDArray[np.int64]) -> list[tuple[int, NDArray[np.int64]]]:
+    """Distinct numbers, each with where it stands.
+
+    >>> [(number, where.tolist()) for number, where in grouped(np.array([7, 3, 7]))]
+    [(3, [1]), (7, [0, 2])]
+    """
+    if not len(numbers):
+        return []
+    order = np.argsort(numbers, kind="stable")
+    distinct, first = np.unique(numbers[order], return_index=True)
+    return list(zip(distinct.tolist(), np.split(order, first[1:]), strict=True))
+
+
+def by_number(numbers: NDArray[np.int64]) -> dict[int, list[int]]:
+    """Positions of each number, in order.
+
+    >>> by_number(np.array([7, 3, 7]))
+    {7: [0, 2], 3: [1]}
+    """
+    found: dict[int, list[int]] = {}
+    for position, number in enumerate(numbers.ravel().tolist()):
+        found.setdefault(number, []).append(position)
+    return found

@@ -182,7 +182,7 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
     bodies: list[Body] = []
     remarks: list[str] = []
     for vertices, triangles, _ in meshes:
-        # What the kernel's mesher leaves open is no fault of whoever drew the part: it is closed, and said.
+        # What stays open as triangles is no fault of whoever drew the part: it is closed, and said.
         body, done = sound_body(vertices, triangles)
         body, done = (body, done) if body is not None else mended(vertices, triangles)
         if body is None:

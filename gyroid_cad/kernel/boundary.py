@@ -39,7 +39,7 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.basis import orders, quotients
-from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge
+from gyroid_cad.trim.boundary import Boundary, BoundaryEdge, BoundaryFace, Coedge, StraightLine
 from gyroid_cad.trim.free_surfaces import FreeForm, Swept
 from gyroid_cad.trim.surfaces import PartSurface, Quadric, QuadricKind
 
@@ -279,7 +279,7 @@ def _curve_in_space(adaptor: Any, order: int = 1) -> Curve:
     kind = adaptor.GetType()
     if kind == GeomAbs_Line:
         line = adaptor.Line()
-        return _line(np.array(_values(line.Location())), np.array(_values(line.Direction())))
+        return StraightLine(np.array(_values(line.Location())), np.array(_values(line.Direction())))
     if kind in (GeomAbs_Circle, GeomAbs_Ellipse):
         conic = adaptor.Circle() if kind == GeomAbs_Circle else adaptor.Ellipse()
         radii = (conic.Radius(),) * 2 if kind == GeomAbs_Circle else (conic.MajorRadius(), conic.MinorRadius())
@@ -309,7 +309,7 @@ def _curve_on_surface(adaptor: BRepAdaptor_Curve2d) -> Curve:
     if kind == GeomAbs_Line:
         line = adaptor.Line()
         origin, along = line.Location(), line.Direction()
-        return _line(np.array([origin.X(), origin.Y()]), np.array([along.X(), along.Y()]))
+        return StraightLine(np.array([origin.X(), origin.Y()]), np.array([along.X(), along.Y()]))
     if kind == GeomAbs_BSplineCurve and not adaptor.BSpline().IsPeriodic():
         spline = adaptor.BSpline()
         poles = [spline.Pole(k) for k in range(1, spline.NbPoles() + 1)]
@@ -324,14 +324,6 @@ def _curve_on_surface(adaptor: BRepAdaptor_Curve2d) -> Curve:
         return tuple(made)
 
     return asked
-
-
-def _line(origin: Floats, direction: Floats) -> Curve:
-    def found(t: Floats) -> tuple[Floats, ...]:
-        along = np.broadcast_to(direction, (len(t), len(direction)))
-        return origin + t[:, np.newaxis] * direction, along, np.zeros_like(along)
-
-    return found
 
 
 def _ellipse(centre: Floats, x: Floats, y: Floats) -> Curve:

@@ -26,7 +26,7 @@ from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 
-__all__ = ["Depths", "FaceDistances", "NearDistances", "points_on"]
+__all__ = ["Depths", "FaceDistances", "Inside", "NearDistances", "points_on"]
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ class Depths:
         self.kept = FaceDistances(face for face in faces if not any(face.IsSame(opening) for opening in openings))
         self.opened = FaceDistances(openings)
         self._random = np.random.default_rng(0)
-        self._solid = _Inside(solid)
+        self._solid = Inside(solid)
         self._near: dict[float, NearDistances] = {}
 
     def _depths(self, points: Floats, skin: float, times: float = 1.0) -> Floats:
@@ -153,7 +153,7 @@ class Depths:
         least, most = _THINNEST * skin, _THICKEST * skin
         outside = self._depths(self._inside, skin, _THINNEST) < least
         inside = self._depths(self._inside, skin, _THICKEST) > most
-        in_core = np.any([_Inside(one).contains(self._inside) for one in core], axis=0)
+        in_core = np.any([Inside(one).contains(self._inside) for one in core], axis=0)
         if np.any(in_core[outside]) or not np.all(in_core[inside]):
             return False
         states = [BRepClass3d_SolidClassifier(one) for one in core]
@@ -186,8 +186,13 @@ class Depths:
         return np.concatenate(found)[:_POINTS_INSIDE]
 
 
-class _Inside:
-    """Tell which points lie in a solid: triangles tell, and the kernel of those that are near its boundary."""
+class Inside:
+    """Inside of a solid: triangles tell which points lie in it, and the kernel of those that are near its boundary.
+
+    Parameters
+    ----------
+    solid : TopoDS_Solid
+    """
 
     def __init__(self, solid: TopoDS_Solid) -> None:
         self.low, self.high = corners_of(box_round([solid]))
@@ -202,7 +207,9 @@ class _Inside:
         distances = self._distances(points)
         inside = distances < 0
         for index in np.flatnonzero(np.abs(distances) < self._band).tolist():
-            inside[index] = _state(self._classifier, points[index]) == TopAbs_IN
+            # It takes some places for ones on the boundary that are not: these the triangles tell.
+            if (state := _state(self._classifier, points[index])) in (TopAbs_IN, TopAbs_OUT):
+                inside[index] = state == TopAbs_IN
         return np.asarray(inside)
 
 

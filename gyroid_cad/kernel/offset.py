@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
+import numpy as np
 from OCP.BinTools import BinTools
 from OCP.BOPAlgo import BOPAlgo_Tools
 from OCP.BRep import BRep_Builder, BRep_Tool
@@ -25,7 +26,7 @@ from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
 from OCP.BRepOffsetAPI import BRepOffsetAPI_MakeOffset, BRepOffsetAPI_MakeOffsetShape, BRepOffsetAPI_MakeThickSolid
 from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
 from OCP.GeomAbs import GeomAbs_Arc, GeomAbs_Intersection, GeomAbs_JoinType, GeomAbs_Plane
-from OCP.gp import gp_Trsf, gp_Vec
+from OCP.gp import gp_Pnt, gp_Trsf, gp_Vec
 from OCP.ShapeCustom import ShapeCustom
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
@@ -35,9 +36,10 @@ from gyroid_cad.common.processes import Started, started
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
-from gyroid_cad.kernel.depth import Depths
+from gyroid_cad.kernel.depth import Depths, FaceDistances
+from gyroid_cad.kernel.offset_surface import FaceOffset
 from gyroid_cad.kernel.ordered import in_order, sorted_by_place
-from gyroid_cad.kernel.sieve import core_of_pieces
+from gyroid_cad.kernel.sieve import OpenSkinError, core_of_pieces
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
 
@@ -46,7 +48,9 @@ Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 _TOLERANCE = 1e-5
 # The kernel's own ways are quick where they work at all; those that are not crash or do not end.
 _SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _SECONDS_BETWEEN_LOOKS = 60.0, 5.0, 0.02
-_PIECES = "pieces"
+_OF_PIECES = _PIECES, _PIECES_TO_OPENINGS = "pieces", "pieces to openings"
+# Faces that are bent alike all over, to rounding, do not fold: they vanish.
+_SAME_RADIUS = 1e-3
 _SOLID, _REASON = "solid.bin", "reason.txt"
 
 
@@ -81,6 +85,8 @@ def offsets(
                 while left and (found := _awaited(process, Path(folder, left[0]))):
                     left.pop(0)
                     yield _read(found) if found.stat().st_size else None
+                if left and left[0] in _OF_PIECES and reasons is not None and process.wait(0) is None:
+                    reasons.append(f"its faces' offsets were not cut against each other in {_SECONDS_AT_MOST:g} s")
             finally:
                 process.kill()
             if left:
@@ -92,7 +98,7 @@ def offsets(
 
 def _awaited(process: Started, path: Path) -> Path | None:
     """The path once there is a file; None if the process ends before, or takes too long."""
-    at_most = _SECONDS_AT_MOST if path.name == _PIECES else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
+    at_most = _SECONDS_AT_MOST if path.name in _OF_PIECES else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
     end = time.monotonic() + at_most
     while not path.exists():
         ended = process.wait(_SECONDS_BETWEEN_LOOKS) is not None
@@ -115,12 +121,23 @@ def work(folder: str, skin: str, numbers: str, *ways: str) -> None:
             # Surfaces that are the offset of another do not survive STEP files.
             plain = ShapeCustom.ConvertToBSpline_s(core, False, False, True, False)
             BinTools.Write_s(plain.Moved(place), str(unfinished))
-        except Exception as failed:
+        except Exception as fault:
+            failed: Exception = fault
             # The kernel has as many kinds of failure as it has algorithms, and some are no exceptions of its own.
             unfinished.write_bytes(b"")
+            if isinstance(failed, OpenSkinError):
+                failed = _placed(failed, given, place)
             if isinstance(failed, KernelError):
                 Path(folder, _REASON).write_text(str(failed), encoding="utf-8")
         unfinished.rename(Path(folder, way))
+
+
+def _placed(failed: OpenSkinError, solid: TopoDS_Shape, place: TopLoc_Location) -> OpenSkinError:
+    """The failure where the solid really is, with the face it is next to."""
+    there = gp_Pnt(*failed.point.tolist()).Transformed(place.Transformation())
+    point = np.array([there.X(), there.Y(), there.Z()])
+    away = [FaceDistances([face]).distance(point) for face in parts_of(solid, TopAbs_FACE)]
+    return OpenSkinError(point, f", next to face {int(np.argmin(away)) + 1}")
 
 
 def _shrunk(
@@ -156,6 +173,10 @@ def _of_pieces(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float
     return compound_of(core_of_pieces(solid, skin))
 
 
+def _of_pieces_to_openings(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> TopoDS_Shape:
+    return compound_of(core_of_pieces(solid, skin, openings))
+
+
 def _less_thick_skin(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, join: GeomAbs_JoinType
 ) -> TopoDS_Shape:
@@ -182,6 +203,7 @@ OPEN_WAYS: Mapping[str, Way] = MappingProxyType(
         "thick skin, arcs": partial(_less_thick_skin, join=GeomAbs_Arc),
         "thick skin, sharp": partial(_less_thick_skin, join=GeomAbs_Intersection),
         "all faces but openings": _offset_but_openings,
+        _PIECES_TO_OPENINGS: _of_pieces_to_openings,
     }
 )
 CLOSED_WAYS: Mapping[str, Way] = MappingProxyType(
@@ -238,17 +260,37 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
                 # What goes on from here is the same at every run.
                 ordered = sorted_by_place(map(in_order, core))
                 return ordered if all(is_valid(one) and topology(one).closed for one in ordered) else core
-    why = "".join(f": {reason}" for reason in reasons)
-    remedy = "another thickness may do, a core of your own (core) does, and without a skin it can still be filled"
-    raise KernelError(f"the kernel cannot offset the part by {skin:g} mm{why}; {remedy}")
+    why = "".join(f": {reason}" for reason in reasons[:1])
+    remedy = "a core of your own (core) does, and without a skin it can still be filled"
+    raise KernelError(
+        f"the kernel cannot offset the part by {skin:g} mm{why}; {_possible(solid, openings, skin)}{remedy}"
+    )
+
+
+def _possible(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> str:
+    """Thickness below which no offset of a face folds, where one does with that which was asked for."""
+    faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
+    folding = [
+        (number, *FaceOffset(face, 0.0, skin).folding())
+        for number, face in enumerate(faces, 1)
+        if not any(face.IsSame(opening) for opening in openings)
+    ]
+    found, most = "another thickness may do, ", skin
+    while narrow := [one for one in folding if one[1] < most < one[2] * (1 - _SAME_RADIUS)]:
+        number, most, _, place = min(narrow, key=lambda one: one[1])
+        where = ", ".join(f"{round(x, 3) + 0.0:g}" for x in place.tolist())
+        found = f"below {most:.3g} mm no offset folds over, a radius to which face {number} is bent at ({where}); "
+    return found
 
 
 def _attempts(
     solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, reasons: list[str]
 ) -> Generator[list[TopoDS_Solid]]:
     ways = list(CLOSED_WAYS)
-    if openings and sum(1 for _ in parts_of(solid, TopAbs_SHELL)) == 1:
-        ways = [*OPEN_WAYS, *ways]
+    if openings:
+        # Of solids with voids the kernel's own ways offset one shell alone.
+        voids = sum(1 for _ in parts_of(solid, TopAbs_SHELL)) > 1
+        ways = [_PIECES_TO_OPENINGS, *ways] if voids else [*OPEN_WAYS, *ways]
     with closing(offsets(solid, openings, skin, ways, reasons)) as found:
         for way, core in zip(ways, found, strict=True):
             if core is not None:

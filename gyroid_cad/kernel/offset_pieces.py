@@ -6,6 +6,9 @@ Faces that pass into each other smoothly share the offset of their common edge, 
 on either side of it: what only touches is joined here, and never sought as a crossing. At edges that point outwards
 the offsets run through each other, and end where nothing is kept.
 
+An opening is its own offset, to which the others come: round its border, as wide as the skin, runs a tube from the
+offset of the face beside it until a little beyond the opening.
+
 An offset has the parameters of its face, so that curves in the parameter plane bound both.
 """
 
@@ -19,28 +22,27 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.Geom import Geom_Circle, Geom_Line, Geom_SphericalSurface
+from OCP.Geom import Geom_Circle, Geom_Line
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
-from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
+from OCP.gp import gp_Ax2, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Solid, TopoDS_Vertex, TopoDS_Wire
 
-from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.graph import connected
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_vertex
 from gyroid_cad.kernel.offset_surface import (
     FaceOffset,
-    between,
+    Rim,
     closed_form_curve,
     curve_points,
     derivatives,
     plane_points,
-    tube_round,
     vector_of,
 )
+from gyroid_cad.kernel.offset_tube import BallArc, ball_round, tube_round
 from gyroid_cad.kernel.spline_fit import fitted_curve, fitted_plane_curve
 
 __all__ = ["offset_pieces"]
@@ -59,6 +61,8 @@ _SHARED = -1
 # Of what is measured between samples, which may be more elsewhere.
 _MARGIN = 1.5
 _CLOSELY = 36
+# By how much the offset beside an opening must come through it to need no tube, in radians.
+_THROUGH = 0.1
 
 
 @dataclass(slots=True)
@@ -73,8 +77,10 @@ class _Side:
     tangents: Floats
 
 
-def offset_pieces(solid: TopoDS_Solid, by: float) -> list[TopoDS_Face]:
-    """Faces, oriented like the solid's, among which is all of the inner side of a skin, and more.
+def offset_pieces(
+    solid: TopoDS_Solid, by: float, openings: Sequence[TopoDS_Face] = ()
+) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
+    """Faces, oriented like the solid's, among which is all of the inner side of a skin, and more; and the openings.
 
     Parameters
     ----------
@@ -82,21 +88,27 @@ def offset_pieces(solid: TopoDS_Solid, by: float) -> list[TopoDS_Face]:
         Without faces that close on themselves.
     by : float
         Thickness of the skin, in mm.
+    openings : sequence of TopoDS_Face
+        Of its faces.
 
     Raises
     ------
     KernelError
         If an offset cannot be fitted.
     """
-    return _Pieces(solid, by).made()
+    return _Pieces(solid, by, openings).made()
 
 
 class _Pieces:
-    def __init__(self, solid: TopoDS_Solid, by: float) -> None:
+    def __init__(self, solid: TopoDS_Solid, by: float, openings: Sequence[TopoDS_Face]) -> None:
         self.by, self.tolerance = by, _TOLERANCE * by
         self.builder, self.place = BRep_Builder(), TopLoc_Location()
         self.faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
-        self.offsets = [FaceOffset(face, by, self.tolerance) for face in self.faces]
+        self.opened = [any(face.IsSame(opening) for opening in openings) for face in self.faces]
+        self.offsets: list[FaceOffset | Rim] = [
+            FaceOffset(face, 0.0 if is_open else by, self.tolerance)
+            for face, is_open in zip(self.faces, self.opened, strict=True)
+        ]
         self.edges, self.vertices = NumberedShapes(), NumberedShapes()
         TopExp.MapShapes_s(solid, TopAbs_EDGE, self.edges)
         TopExp.MapShapes_s(solid, TopAbs_VERTEX, self.vertices)
@@ -105,6 +117,9 @@ class _Pieces:
             for shape in parts_of(face.Oriented(TopAbs_FORWARD), TopAbs_EDGE):
                 self.sides.setdefault(self.edges.FindIndex(shape), []).append(self._side(index, as_edge(shape)))
         self.bends = {number: _bend(*sides) for number, sides in self.sides.items() if len(sides) == 2}
+        self.rims: dict[int, list[_Side]] = {}
+        for number in list(self.bends):
+            self._open(number)
         self.ends: dict[int, tuple[int, int]] = {}
         for number in self.sides:
             edge = as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD))
@@ -115,13 +130,42 @@ class _Pieces:
         self.places, self.corners = self._corners()
         self.made_vertices: dict[int, TopoDS_Vertex] = {}
         self.made_edges: dict[tuple[int, int], TopoDS_Edge] = {}
-        self.arcs: dict[tuple[int, frozenset[int]], _Arc] = {}
+        self.arcs: dict[tuple[int, frozenset[int]], BallArc] = {}
 
-    def made(self) -> list[TopoDS_Face]:
-        faces = [self._offset_face(index) for index in range(len(self.faces)) if self.offsets[index].surface]
+    def made(self) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
+        faces = {index: self._offset_face(index) for index in range(len(self.faces)) if self.offsets[index].surface}
         tubes = [self._tube(number) for number, bend in self.bends.items() if bend.min() < -_SMOOTH]
+        tubes += [self._tube(number) for number in self.rims]
         balls = [ball for vertex in range(1, self.vertices.Extent() + 1) for ball in self._balls(vertex)]
-        return [*faces, *tubes, *balls]
+        kept, opened = ([face for index, face in faces.items() if self.opened[index] == side] for side in (False, True))
+        return [*kept, *tubes, *balls], opened
+
+    def _open(self, number: int) -> None:
+        """Have an edge of openings for what it is: between two of them there is none, else a rim goes along it."""
+        sides = self.sides[number]
+        opened = [side for side in sides if self.opened[side.face]]
+        if len(opened) == 2:
+            self.bends[number] = np.zeros(_SAMPLES)
+        if len(opened) != 1:
+            return
+        del self.bends[number]
+        (side,), (beside,) = opened, [side for side in sides if not self.opened[side.face]]
+        offset = self.offsets[side.face]
+        assert isinstance(offset, FaceOffset)
+        rim = Rim(offset, side.curve, _sign(offset, side.edge), self.by)
+        line = Geom2d_Line(gp_Pnt2d(0.0, 0.0), gp_Dir2d(1.0, 0.0))
+        normals = rim.normals(plane_points(line, side.parameters))
+        end = _Side(len(self.offsets), side.edge, line, side.parameters, normals, side.tangents)
+        self.offsets.append(rim)
+        sides.append(end)
+        # Where the offset of the face beside it comes through the opening by itself, no tube goes on from it.
+        up, into = rim.axes(side.parameters)
+        if np.min(np.arctan2(np.sum(beside.normals * up, axis=1), -np.sum(beside.normals * into, axis=1))) > -_THROUGH:
+            self.rims[number] = [beside, end]
+
+    def _pair(self, number: int) -> list[_Side]:
+        """Sides that a tube round an edge runs between."""
+        return self.rims.get(number) or self.sides[number]
 
     def _side(self, index: int, edge: TopoDS_Edge) -> _Side:
         face = self.faces[index]
@@ -130,8 +174,9 @@ class _Pieces:
         parameters = np.linspace(first, last, _SAMPLES)
         places = plane_points(curve, parameters)
         offset = self.offsets[index]
-        sign = offset.outwards * (-1.0 if edge.Orientation() == TopAbs_REVERSED else 1.0)
-        return _Side(index, edge, curve, parameters, offset.normals(places), sign * offset.tangents(curve, parameters))
+        assert isinstance(offset, FaceOffset)
+        tangents = _sign(offset, edge) * offset.tangents(curve, parameters)
+        return _Side(index, edge, curve, parameters, offset.normals(places), tangents)
 
     def _smooth(self, number: int) -> bool:
         bend = self.bends.get(number)
@@ -243,7 +288,7 @@ class _Pieces:
         return as_face(made.Oriented(self.faces[index].Orientation()))
 
     def _tube(self, number: int) -> TopoDS_Face:
-        sides = self.sides[number]
+        sides = self._pair(number)
         first, last = sides[0].parameters[[0, -1]].tolist()
         curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
         ways = [partial(self._inwards, side) for side in sides]
@@ -291,12 +336,12 @@ class _Pieces:
     def _inwards(self, side: _Side, parameters: Floats) -> Floats:
         return -self.offsets[side.face].normals(plane_points(side.curve, parameters))
 
-    def _arc(self, number: int, at: int, parameter: float) -> tuple[_Arc, bool]:
+    def _arc(self, number: int, at: int, parameter: float) -> tuple[BallArc, bool]:
         """The arc that ends the tube round an edge, and whether it runs from the second side to the first.
 
         Tubes that go on in each other share it.
         """
-        sides, vertex = self.sides[number], self.ends[number][at]
+        sides, vertex = self._pair(number), self.ends[number][at]
         corners = [self.corners[vertex, side.face] for side in sides]
         key = (vertex, frozenset(corners))
         if key not in self.arcs:
@@ -312,7 +357,7 @@ class _Pieces:
                 axes = gp_Ax2(place, gp_Dir(*np.cross(start, stop).tolist()), gp_Dir(*start.tolist()))
                 self.builder.MakeEdge(edge, Geom_Circle(axes, self.by), _MARGIN * self.tolerance)
             self._bound(edge, [self._vertex(corner) for corner in corners], 0.0, angle, _MARGIN * self.tolerance)
-            self.arcs[key] = _Arc(edge, (corners[0], corners[1]), vector_of(place), start, stop, angle)
+            self.arcs[key] = BallArc(edge, (corners[0], corners[1]), vector_of(place), start, stop, angle)
         arc = self.arcs[key]
         arc.uses += 1
         return arc, arc.corners[0] != corners[0]
@@ -331,56 +376,7 @@ class _Pieces:
                 arcs.remove(following[0])
                 loop.append(following[0])
                 end = next(corner for corner in following[0].corners if corner != end)
-            yield self._ball(loop)
-
-    def _ball(self, loop: list[_Arc]) -> TopoDS_Face:
-        centre = loop[0].centre
-        towards = unit(np.sum([unit(arc.start + arc.stop) for arc in loop], axis=0))
-        side = unit(np.cross(towards, np.eye(3)[np.argmin(np.abs(towards))]))
-        # Seam and poles lie as far away as they can.
-        axes = gp_Ax3(gp_Pnt(*centre.tolist()), gp_Dir(*side.tolist()), gp_Dir(*(-towards).tolist()))
-        surface = Geom_SphericalSurface(axes, self.by)
-        third = np.cross(side, -towards)
-        made, wire = TopoDS_Face(), TopoDS_Wire()
-        self.builder.MakeFace(made, surface, self.place, _LEAST_TOLERANCE)
-        self.builder.MakeWire(wire)
-        turned, end = [], loop[0].corners[0]
-        corners = []
-        for arc in loop:
-            forwards = arc.corners[0] == end
-            end = arc.corners[1] if forwards else arc.corners[0]
-
-            def places(parameters: Floats, arc: _Arc = arc) -> Floats:
-                ways = between(arc.start[np.newaxis], arc.stop[np.newaxis], parameters / arc.angle)[:, 0]
-                u = np.arctan2(ways @ third, ways @ -towards) % (2 * np.pi)
-                return np.stack([u, np.arcsin(np.clip(ways @ side, -1, 1))], axis=1)
-
-            line = fitted_plane_curve(places, [0.0, arc.angle], self.tolerance / self.by)
-            self.builder.UpdateEdge(arc.edge, line, surface, self.place, 3 * self.tolerance)
-            turned.append(arc.edge.Oriented(TopAbs_FORWARD if forwards else TopAbs_REVERSED))
-            shown = places(np.linspace(0, arc.angle, _SAMPLES))
-            corners += list(shown if forwards else shown[::-1])[:-1]
-        x, y = np.array(corners).T
-        anticlockwise = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) > 0
-        for edge in turned if anticlockwise else [edge.Reversed() for edge in reversed(turned)]:
-            self.builder.Add(wire, edge)
-        wire.Closed(True)
-        self.builder.Add(made, wire)
-        # A ball's own normal runs away from its centre, where the core's runs towards it.
-        return as_face(made.Oriented(TopAbs_REVERSED))
-
-
-@dataclass(slots=True)
-class _Arc:
-    """An edge on the ball round a corner, between what two faces' offsets make of the corner."""
-
-    edge: TopoDS_Edge
-    corners: tuple[int, int]
-    centre: Floats
-    start: Floats
-    stop: Floats
-    angle: float
-    uses: int = 0
+            yield ball_round(loop, self.by, self.tolerance)
 
 
 def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_Curve:
@@ -392,6 +388,11 @@ def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_
     return fitted_plane_curve(
         lambda parameters: start + np.outer((parameters - first) / (last - first), way), [first, last], _SAME
     )
+
+
+def _sign(offset: FaceOffset, edge: TopoDS_Edge) -> float:
+    """1 if an edge's curve runs round a face anticlockwise, seen from outside, else -1."""
+    return offset.outwards * (-1.0 if edge.Orientation() == TopAbs_REVERSED else 1.0)
 
 
 def _bend(one: _Side, other: _Side) -> Floats:

@@ -14,16 +14,14 @@ from OCP.Geom import (
     Geom_BSplineSurface,
     Geom_Circle,
     Geom_Curve,
-    Geom_CylindricalSurface,
     Geom_Line,
     Geom_OffsetSurface,
     Geom_RectangularTrimmedSurface,
     Geom_Surface,
-    Geom_ToroidalSurface,
 )
 from OCP.Geom2d import Geom2d_Curve
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-from OCP.gp import gp_Ax2, gp_Ax3, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
@@ -34,13 +32,11 @@ from gyroid_cad.nurbs.surface import NurbsSurface
 
 __all__ = [
     "FaceOffset",
-    "Tube",
-    "between",
+    "Rim",
     "closed_form_curve",
     "curve_points",
     "derivatives",
     "plane_points",
-    "tube_round",
     "vector_of",
 ]
 
@@ -53,8 +49,11 @@ _SAME = 1e-9
 _POLE, _BESIDE = 1e-7, 1e-6
 # By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
 _LEAST_STRETCH = 1e-4
-_SAMPLES, _STEP = 9, 1e-5
-_ACROSS = (0.0, 0.5, 1.0)
+_SAMPLES, _CLOSELY, _STEP = 9, 21, 1e-5
+# The place where a face is bent most is sought in ever smaller grids.
+_ZOOMS, _ROUND, _BORDER = 8, np.linspace(-1, 1, 5), 1e-4
+# How far tubes go on outside an opening, in radians.
+_BEYOND = 0.35
 
 
 class FaceOffset:
@@ -65,7 +64,7 @@ class FaceOffset:
     face : TopoDS_Face
         Oriented out of its solid.
     by : float
-        In mm.
+        In mm; 0 of an opening, whose offset is the face itself.
     tolerance : float
         Of a fit, in mm.
 
@@ -91,7 +90,9 @@ class FaceOffset:
         self.by = by
         self.bounds = np.array(BRepTools.UVBounds_s(face)).reshape(2, 2)
         self.surface: Geom_Surface | None = None
-        if not self.bent_away():
+        if by == 0:
+            self.surface = self.base
+        elif not self.bent_away():
             self.surface = self._closed_form() or self._fitted(tolerance)
 
     def _derivatives(self, places: Floats) -> tuple[Floats, Floats, Floats]:
@@ -127,16 +128,34 @@ class FaceOffset:
 
     def bent_away(self) -> bool:
         """True where the face is bent more than the offset is wide, all over: then nothing of it bounds a core."""
-        places = self._grid(_SAMPLES)
-        step = _STEP * np.ptp(self.bounds, axis=1)
-        _, along_u, along_v = self._derivatives(places)
-        moved = [
-            (self.points(places + shift) - self.points(places - shift)) / (2 * step[way])
-            for way, shift in enumerate(np.diag(step))
-        ]
-        basis = np.stack([along_u, along_v], axis=-1)
-        stretch = np.linalg.pinv(basis) @ np.stack(moved, axis=-1)
-        return bool(np.all(np.linalg.eigvals(stretch).real.min(axis=1) < _LEAST_STRETCH))
+        return bool(np.all(1 - self.by * self._curvatures(self._grid(_SAMPLES)) < _LEAST_STRETCH))
+
+    def folding(self) -> tuple[float, float, Floats]:
+        """Smallest and largest radius to which the face is bent outwards, in mm, and the place of the smallest.
+
+        An offset between these folds over: it is turned inside out in some places and not in others.
+        """
+        places = self._grid(_CLOSELY)
+        found = self._curvatures(places)
+        least, (low, high) = found.min(), self.bounds.T
+        reach = (high - low) / _CLOSELY
+        for _ in range(_ZOOMS):
+            # Where it is bent most more closely, but for its very border, beyond which it may not go on.
+            inner = _BORDER * (high - low)
+            u, v = np.clip(places[np.argmax(found)] + np.outer(_ROUND, reach), low + inner, high - inner).T
+            places = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+            found, reach = self._curvatures(places), reach / 2
+        worst, tiny = int(np.argmax(found)), np.finfo(float).tiny
+        place = self._derivatives(places[[worst]])[0][0]
+        return float(1 / max(found[worst], tiny)), float(1 / max(least, tiny)), place
+
+    def _curvatures(self, places: Floats) -> Floats:
+        """Larger principal curvature at parameters, above 0 where the face is bent outwards; shape (n,)."""
+        steps = np.diag(_STEP * np.ptp(self.bounds, axis=1))
+        _, *along = self._derivatives(places)
+        turns = [(self.normals(places + step) - self.normals(places - step)) / (2 * step.sum()) for step in steps]
+        shape = np.linalg.pinv(np.stack(along, axis=-1)) @ np.stack(turns, axis=-1)
+        return np.asarray(np.linalg.eigvals(shape).real.max(axis=1))
 
     def points(self, places: Floats) -> Floats:
         """Points of the offset at parameters, shape (n, 2); shape (n, 3)."""
@@ -169,6 +188,49 @@ class FaceOffset:
         """So many places along either side, none of them on a side, which may be a point; shape (n, 2)."""
         u, v = (np.linspace(low, high, count + 2)[1:-1] for low, high in self.bounds)
         return np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rim:
+    """End of the tube round an opening's border, a little outside, as the offset of a face beside it would be.
+
+    Its parameters are those of the edge, and zero.
+
+    Attributes
+    ----------
+    opening : FaceOffset
+        By nothing.
+    curve : Geom2d_Curve
+        Of the edge in its parameters.
+    sign : float
+        1 if the curve runs round the opening anticlockwise, seen from outside, else -1.
+    by : float
+        Radius of the tube, in mm.
+    """
+
+    opening: FaceOffset
+    curve: Geom2d_Curve
+    sign: float
+    by: float
+    surface: None = None
+
+    def axes(self, along: Floats) -> tuple[Floats, Floats]:
+        """Unit vectors out of the opening, and along it away from its border; shape (n, 3) each."""
+        up = self.opening.normals(plane_points(self.curve, along))
+        return up, np.cross(up, self.sign * self.opening.tangents(self.curve, along))
+
+    def normals(self, places: Floats) -> Floats:
+        """Away from where the tube ends, as from a face inwards; shape (n, 3)."""
+        up, into = self.axes(places[:, 0])
+        return np.asarray(-np.cos(_BEYOND) * into - np.sin(_BEYOND) * up)
+
+    def points(self, places: Floats) -> Floats:
+        """Ends of the tube, shape (n, 3)."""
+        on_edge = self.opening.points(plane_points(self.curve, places[:, 0]))
+        return np.asarray(on_edge - self.by * self.normals(places))
+
+    def on_surface(self, places: Floats) -> Floats:
+        return self.points(places)
 
 
 def _net(surface: Geom_Surface) -> NurbsSurface | None:
@@ -247,94 +309,6 @@ def closed_form_curve(
     return curve if off < _SAME * max(1.0, float(np.abs(points).max())) else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tube:
-    """A tube's surface, and where on it the tube is.
-
-    Attributes
-    ----------
-    surface : Geom_Surface
-    place : callable
-        Parameters of the surface, shape (2,), for how far across the tube, from 0 to 1, and a parameter along it.
-    """
-
-    surface: Geom_Surface
-    place: Callable[[float, float], Floats]
-
-
-def tube_round(
-    curve: BRepAdaptor_Curve,
-    start_at: Callable[[Floats], Floats],
-    stop_at: Callable[[Floats], Floats],
-    by: float,
-    tolerance: float,
-) -> Tube:
-    """A tube round a curve: a cylinder round a line, a torus round a circle, else a fitted spline.
-
-    Parameters
-    ----------
-    curve : BRepAdaptor_Curve
-    start_at, stop_at : callable
-        Directions from the curve to the tube's borders at parameters of the curve, shape (n, 3).
-    by, tolerance : float
-        The tube's radius, and that of a fit, in mm.
-
-    Raises
-    ------
-    KernelError
-        If no spline comes near enough.
-    """
-    first, last = curve.FirstParameter(), curve.LastParameter()
-    parameters = np.linspace(first, last, _SAMPLES)
-
-    def points(across: Floats, along: Floats) -> Floats:
-        return curve_points(curve, along) + by * between(start_at(along), stop_at(along), across)
-
-    expected = points(np.array(_ACROSS), parameters)
-    start, stop = start_at(parameters[:1])[0], stop_at(parameters[:1])[0]
-    for tube in (_cylinder(curve, start, stop, by), _torus(curve, start, stop, by)):
-        if tube is not None:
-            places = np.array([tube.place(across, along) for across in _ACROSS for along in parameters.tolist()])
-            off = np.abs(derivatives(tube.surface, places)[0] - expected.reshape(-1, 3)).max()
-            if off < _SAME * max(1.0, float(np.abs(expected).max())):
-                return tube
-    surface = fitted_surface(points, [0.0, 1.0], [first, last], tolerance)
-    return Tube(surface, lambda across, along: np.array([across, along]))
-
-
-def _cylinder(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
-    if curve.GetType() != GeomAbs_Line:
-        return None
-    line = curve.Line()
-    angle = float(np.arctan2(vector_of(line.Direction()) @ np.cross(start, stop), start @ stop))
-    axes = gp_Ax3(line.Location(), line.Direction(), gp_Dir(*start.tolist()))
-    return Tube(Geom_CylindricalSurface(axes, by), lambda across, along: np.array([across * angle, along]))
-
-
-def _torus(curve: BRepAdaptor_Curve, start: Floats, stop: Floats, by: float) -> Tube | None:
-    if curve.GetType() != GeomAbs_Circle or curve.Circle().Radius() <= (1 + _SAME) * by:
-        return None
-    circle = curve.Circle()
-    axis = vector_of(circle.Axis().Direction())
-    radial = unit(curve_points(curve, np.array([curve.FirstParameter()]))[0] - vector_of(circle.Location()))
-    angles = [float(np.arctan2(way @ axis, way @ radial)) for way in (start, stop)]
-    angle = (angles[1] - angles[0] + np.pi) % (2 * np.pi) - np.pi
-    axes = gp_Ax3(circle.Location(), circle.Axis().Direction(), circle.XAxis().Direction())
-    surface = Geom_ToroidalSurface(axes, circle.Radius(), by)
-    return Tube(surface, lambda across, along: np.array([along, angles[0] + across * angle]))
-
-
 def vector_of(given: gp_Pnt | gp_Dir) -> Floats:
     """Coordinates of a point or a direction, shape (3,)."""
     return np.array([given.X(), given.Y(), given.Z()])
-
-
-def between(one: Floats, other: Floats, across: Floats) -> Floats:
-    """Unit vectors on great circles from some to others, each shape (n, 3), so far across; shape (k, n, 3)."""
-    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
-    sines = np.sin(angles)
-    flat = sines < _SAME
-    safe = np.where(flat, 1.0, sines)
-    a = np.where(flat, 1 - across[:, np.newaxis], np.sin((1 - across)[:, np.newaxis] * angles) / safe)
-    b = np.where(flat, across[:, np.newaxis], np.sin(across[:, np.newaxis] * angles) / safe)
-    return np.asarray(a[..., np.newaxis] * one + b[..., np.newaxis] * other)

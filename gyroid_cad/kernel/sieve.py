@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,12 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Solid, TopoDS_Wire
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
-from gyroid_cad.kernel.depth import NearDistances, points_on
+from gyroid_cad.kernel.depth import Inside, NearDistances, points_on
 from gyroid_cad.kernel.offset_pieces import offset_pieces
 from gyroid_cad.kernel.offset_surface import curve_points
 from gyroid_cad.kernel.split import Change, changes, general_fuse, modified, solids_of
 
-__all__ = ["core_of_pieces", "with_changes"]
+__all__ = ["OpenSkinError", "core_of_pieces", "with_changes"]
 
 Floats = NDArray[np.float64]
 
@@ -32,9 +33,28 @@ _OFF = 1e-3
 _MOST = 0.5
 # Of the thickness of a skin, within which places are one: more where two tubes that meet touch before they cross.
 _FUZZY = (0.0, 1e-3)
+# Of the thickness of a skin, by which it is thinner or thicker where offsets touch without crossing else.
+_NEARLY = (0.0, -5e-4, 5e-4)
 
 
-def core_of_pieces(solid: TopoDS_Solid, skin: float) -> list[TopoDS_Solid]:
+class OpenSkinError(KernelError):
+    """Failure of a skin's inner side to close.
+
+    Parameters
+    ----------
+    point : ndarray, shape (3,)
+        Where, in mm.
+    beside : str
+        What is there.
+    """
+
+    def __init__(self, point: Floats, beside: str = "") -> None:
+        place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in point.tolist())
+        super().__init__(f"the inner side of the skin does not close round ({place}){beside}")
+        self.point = point
+
+
+def core_of_pieces(solid: TopoDS_Solid, skin: float, openings: Sequence[TopoDS_Face] = ()) -> list[TopoDS_Solid]:
     """Offset a solid inwards by a skin, corner by corner whatever the corners are.
 
     Parameters
@@ -42,17 +62,32 @@ def core_of_pieces(solid: TopoDS_Solid, skin: float) -> list[TopoDS_Solid]:
     solid : TopoDS_Solid
     skin : float
         In mm.
+    openings : sequence of TopoDS_Face
+        Of its faces, to which the core comes, but for a rim as wide as the skin.
 
     Raises
     ------
     KernelError
         If what is kept does not close: it says where.
     """
-    depths = NearDistances(parts_of(solid, TopAbs_FACE), skin)
+    faces = [face for face in parts_of(solid, TopAbs_FACE) if not any(face.IsSame(opening) for opening in openings)]
+    depths, inside = NearDistances(faces, skin), Inside(solid) if openings else None
+    problem: KernelError | None = None
+    for part in _NEARLY:
+        try:
+            return _core_of_pieces(solid, _Places(depths, (1 + part) * skin, inside), openings)
+        except KernelError as failed:
+            problem = problem or failed
+    assert problem is not None
+    raise problem
+
+
+def _core_of_pieces(solid: TopoDS_Solid, places: _Places, openings: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
+    kept, opened = offset_pieces(solid, places.skin, openings)
     pieces: list[TopoDS_Face] = []
     deep: list[bool] = []
-    for piece in offset_pieces(solid, skin):
-        enough = depths(np.concatenate([points_on(piece, _POINTS_ON_PIECE), _border(piece)])) >= (1 - _OFF) * skin
+    for piece in kept:
+        enough = places.deep(np.concatenate([points_on(piece, _POINTS_ON_PIECE), _border(piece)]))
         if enough.any():
             pieces.append(piece)
             deep.append(bool(enough.all()))
@@ -62,28 +97,52 @@ def core_of_pieces(solid: TopoDS_Solid, skin: float) -> list[TopoDS_Solid]:
     crossing = [piece for index, piece in enumerate(pieces) if not deep[index] or index in lone]
     for fuzzy in _FUZZY[:-1]:
         with suppress(KernelError):
-            return _assembled(whole, crossing, skin, depths, fuzzy)
-    return _assembled(whole, crossing, skin, depths, _FUZZY[-1])
+            return _assembled(whole, crossing, opened, places, fuzzy)
+    return _assembled(whole, crossing, opened, places, _FUZZY[-1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Places:
+    """Tells which places may be on a core's boundary: deep enough, and in the solid where it has openings."""
+
+    depths: NearDistances
+    skin: float
+    inside: Inside | None
+
+    def deep(self, points: Floats, opened: bool = False) -> NDArray[np.bool_]:
+        found = np.asarray(self.depths(points) >= (1 - _OFF) * self.skin)
+        if self.inside is not None and not opened and found.any():
+            found[found] = self.inside.contains(points[found])
+        return found
+
+    def keep(self, face: TopoDS_Face, opened: bool) -> bool:
+        return bool(np.mean(self.deep(points_on(face, _POINTS_ON_PIECE), opened)) > _MOST)
 
 
 def _assembled(
-    whole: Sequence[TopoDS_Face], crossing: Sequence[TopoDS_Face], skin: float, depths: NearDistances, fuzzy: float
+    whole: Sequence[TopoDS_Face],
+    crossing: Sequence[TopoDS_Face],
+    opened: Sequence[TopoDS_Face],
+    places: _Places,
+    fuzzy: float,
 ) -> list[TopoDS_Solid]:
-    """The solids that pieces bound, once those that cross are cut against each other."""
+    """The solids that pieces bound, once those that cross are cut against each other and the openings."""
     faces = list(whole)
-    if crossing:
+    if crossing or opened:
+        together = [*crossing, *opened]
         fuse = general_fuse(
-            *crossing, fuzzy=fuzzy * skin, task="cut the offsets of the part's faces against each other"
+            *together, fuzzy=fuzzy * places.skin, task="cut the offsets of the part's faces against each other"
         )
-        images = [as_face(image) for piece in crossing for image in modified(fuse, piece)]
-        kept = [image for image in images if _is_deep(image, skin, depths)]
-        faces = [*with_changes(whole, changes(fuse, compound_of(crossing))), *kept]
+        kept = [
+            as_face(image)
+            for some, is_open in ((crossing, False), (opened, True))
+            for piece in some
+            for image in modified(fuse, piece)
+            if places.keep(as_face(image), is_open)
+        ]
+        faces = [*with_changes(whole, changes(fuse, compound_of(together))), *kept]
     _require_closed(faces)
     return solids_of(faces)
-
-
-def _is_deep(face: TopoDS_Face, skin: float, depths: NearDistances) -> bool:
-    return bool(np.mean(depths(points_on(face, _POINTS_ON_PIECE)) >= (1 - _OFF) * skin) > _MOST)
 
 
 def _border(face: TopoDS_Face) -> Floats:
@@ -120,8 +179,7 @@ def _require_closed(faces: Sequence[TopoDS_Face]) -> None:
         if len(users) != 2 or users[0][1] == users[1][1]:
             curve = BRepAdaptor_Curve(edge)
             middle = (curve.FirstParameter() + curve.LastParameter()) / 2
-            place = ", ".join(f"{x:.4g}" for x in curve_points(curve, np.array([middle]))[0])
-            raise KernelError(f"the inner side of the skin does not close round ({place})")
+            raise OpenSkinError(curve_points(curve, np.array([middle]))[0])
 
 
 def with_changes(faces: Iterable[TopoDS_Face], changed: Iterable[Change]) -> list[TopoDS_Face]:

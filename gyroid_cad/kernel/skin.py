@@ -28,7 +28,7 @@ from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part, selected_faces
 from gyroid_cad.kernel.sieve import with_changes
-from gyroid_cad.kernel.split import Pieces, general_fuse, inner_sides, modified, solids_of
+from gyroid_cad.kernel.split import Pieces, changes, general_fuse, inner_sides, modified, solids_of
 
 __all__ = ["Hollow", "hollow", "hollow_round", "opened_faces", "openings_of"]
 
@@ -284,19 +284,28 @@ def _shown(given: Sequence[TopoDS_Shape]) -> str:
 
 def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face], skin: float) -> Hollow:
     """Skin and core of a part with openings, once the part's faces there are split where the core comes to them."""
-    fuse = general_fuse(part.shape, core.shape)
-    solids = [as_solid(image) for solid in core.solids for image in modified(fuse, solid)]
-    core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
-    inner, ends = _set_of(_faces_of(core.shape)), ShapeSet()
+    target = FaceDistances(openings)
+    faces = _faces_of(core.shape)
+    ends = [bool(target.distances(points_on(face, _POINTS_ON_FACE)).max() < _SAME_PLACE * skin) for face in faces]
+    if not any(ends):
+        raise KernelError("the kernel's core does not come to an opening")
+    coming = [face for face, is_end in zip(faces, ends, strict=True) if is_end]
+    # Nothing but these faces touches the part: solids as a whole need not be looked at, which fails more often.
+    fuse = general_fuse(*openings, *coming)
+    changed = changes(fuse, compound_of([*openings, *coming]))
+    images = _set_of(as_face(image) for face in coming for image in modified(fuse, face))
+    rims = [as_face(piece) for opening in openings for piece in modified(fuse, opening)]
     for opening in openings:
-        found = [image for image in modified(fuse, opening) if inner.Contains(image)]
-        if not found:
+        if not any(images.Contains(piece) for piece in modified(fuse, opening)):
             raise KernelError("the kernel's core does not come to an opening")
-        for image in found:
-            ends.Add(image)
-    pieces = (as_face(piece) for face in _faces_of(part.shape) for piece in modified(fuse, face))
-    own = tuple(piece for piece in pieces if not inner.Contains(piece))
-    made = Hollow(own, core, tuple(bool(ends.Contains(face)) for face in _faces_of(core.shape)), skin)
+    kept = [face for face in _faces_of(part.shape) if not any(face.IsSame(opening) for opening in openings)]
+    own = [*with_changes(kept, changed), *(piece for piece in rims if not images.Contains(piece))]
+    inner = [face for face, is_end in zip(faces, ends, strict=True) if not is_end]
+    shared = [piece for piece in rims if images.Contains(piece)]
+    solids = solids_of([*with_changes(inner, changed), *shared])
+    core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
+    opened = _set_of(shared)
+    made = Hollow(tuple(own), core, tuple(bool(opened.Contains(face)) for face in _faces_of(core.shape)), skin)
     _require_all_of(part, made)
     return made
 

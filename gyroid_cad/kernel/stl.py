@@ -16,26 +16,21 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.gp import gp_Trsf, gp_Vec
-from OCP.Poly import Poly_Triangulation
 from OCP.StlAPI import StlAPI_Writer
-from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID, TopAbs_VERTEX
-from OCP.TopExp import TopExp
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.kernel.check import compound_of, parts_of
-from gyroid_cad.kernel.compat import ShapesOfShape, as_face, as_vertex
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.outlines import face_triangles
-from gyroid_cad.kernel.solid import TOLERANCE
 from gyroid_cad.kernel.surfaces import translation
 from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners, renumbered
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import is_coarse
-from gyroid_cad.mesh.triangles.triangulation import parting
 from gyroid_cad.mesh.triangles.writing import storable_triangles, write_triangles
 
 __all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "solid_triangles", "write_meshed_stl"]
@@ -264,36 +259,4 @@ def _meshed_copy(shape: TopoDS_Shape, path: str | os.PathLike[str], deviation: f
     mesher = BRepMesh_IncrementalMesh(copy, deviation, False, radians(angle), True)
     if not mesher.IsDone():
         raise ExportError(f"{path} was not written: the kernel's mesher failed")
-    _part_touching_vertices(copy, deviation)
     return copy
-
-
-def _part_touching_vertices(shape: TopoDS_Shape, deviation: float) -> None:
-    """Move mesh nodes at vertices that coincide but are not the same, each into its own faces."""
-    from scipy.spatial import cKDTree
-
-    faces_of_vertex = ShapesOfShape()
-    TopExp.MapShapesAndAncestors_s(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex)
-    points = [BRep_Tool.Pnt_s(as_vertex(faces_of_vertex.FindKey(i))) for i in range(1, faces_of_vertex.Extent() + 1)]
-    positions = np.array([(p.X(), p.Y(), p.Z()) for p in points])
-    distance = parting(deviation, float(np.abs(positions).max()))
-    touching = np.unique(cKDTree(positions).query_pairs(TOLERANCE, output_type="ndarray"))
-    for vertex in touching.tolist():
-        # A face used by two edges at the vertex is listed twice.
-        faces = {face.__hash__(): as_face(face) for face in faces_of_vertex.FindFromIndex(vertex + 1)}
-        meshes = [_placed_mesh(face) for face in faces.values()]
-        inward = np.mean([nodes.mean(axis=0) - positions[vertex] for _, _, nodes in meshes], axis=0)
-        step = gp_Vec(*(inward * (distance / np.linalg.norm(inward))).tolist())
-        for mesh, placement, nodes in meshes:
-            node = int(np.argmin(np.sum((nodes - positions[vertex]) ** 2, axis=1))) + 1
-            moved = mesh.Node(node).Transformed(placement).Translated(step)
-            mesh.SetNode(node, moved.Transformed(placement.Inverted()))
-
-
-def _placed_mesh(face: TopoDS_Face) -> tuple[Poly_Triangulation, gp_Trsf, Floats]:
-    """A face's triangulation, where it stands, and its nodes there; shape (nodes, 3)."""
-    location = TopLoc_Location()
-    mesh = BRep_Tool.Triangulation_s(face, location)
-    placement = location.Transformation()
-    placed = (mesh.Node(i).Transformed(placement) for i in range(1, mesh.NbNodes() + 1))
-    return mesh, placement, np.array([(p.X(), p.Y(), p.Z()) for p in placed])

@@ -51,7 +51,11 @@ class SquareQuadrature:
         return face_integrals(nets, weights, (self.knots, self.knots), self.places, self.places, both)
 
     def over(self, places: Floats, rates: Floats, density: Floats) -> Floats:
-        """Sum over places of a rate times the integral of a density along u, from -1 to the place.
+        """Sum over places of their shares of an integral, shape (k,)."""
+        return np.asarray(self.shares(places, rates, density).sum(axis=0))
+
+    def shares(self, places: Floats, rates: Floats, density: Floats) -> Floats:
+        """Of each place a rate times the integral of a density along u, from -1 to the place.
 
         Parameters
         ----------
@@ -64,7 +68,7 @@ class SquareQuadrature:
 
         Returns
         -------
-        ndarray, shape (k,)
+        ndarray, shape (m, k)
         """
         spans = len(self.breaks) - 1
         blocks = density.reshape(spans, _PER_SPAN, spans, _PER_SPAN, -1)
@@ -73,7 +77,7 @@ class SquareQuadrature:
         (span_u, _, up_to), (span_v, at, _) = (self._functions(x) for x in places.T)
         # A place takes from one span along v: small products, where those of full matrices would be mostly of zeros.
         along_u = before[span_u, span_v] + np.einsum("mp,mpqk->mqk", up_to, blocks[span_u, :, span_v])
-        return np.asarray(np.einsum("m,mq,mqk->k", rates, at, along_u))
+        return np.asarray(np.einsum("m,mq,mqk->mk", rates, at, along_u))
 
     def _functions(self, x: Floats) -> tuple[Integers, Floats, Floats]:
         """Span of each x; there Lagrange's polynomials on its nodes, and their integrals from its start to x."""

@@ -189,7 +189,7 @@ def facets_of_shape(
     places: Floats | None = None,
     extent: float | None = None,
 ) -> Facets:
-    """Triangles of a shape by the kernel's mesher; faces of a lattice in the two colours of its sides.
+    """Triangles of a shape; faces of a lattice in the two colours of its sides.
 
     Parameters
     ----------
@@ -204,14 +204,14 @@ def facets_of_shape(
     Raises
     ------
     ExportError
-        If the mesher fails.
+        If a face has no triangles.
     """
     from gyroid_cad.kernel.check import topology
     from gyroid_cad.kernel.reading import lattice_sides, shown_triangles
 
     usual = [COLOURS[REST if side is None else side] for side in lattice_sides(shape)]
     if not usual:
-        # The kernel's mesher refuses to mesh nothing.
+        # Of nothing there is no diagonal to measure a deviation by.
         return facets_of_triangles(np.empty((0, 3)), np.empty((0, 3)), closed=False)
     vertices, triangles, faces = shown_triangles(shape, extent)
     own = usual if colours is None else [colour or other for colour, other in zip(colours, usual, strict=True)]

@@ -45,12 +45,12 @@ def wall_picture(wall: Wall, size: tuple[int, int], camera: Vector) -> bytes:
 
 
 def shape_picture(shape: KernelShape, size: tuple[int, int], camera: Vector) -> bytes:
-    """A shape of the kernel as a PNG file, meshed by the kernel.
+    """A shape of the kernel as a PNG file, by the triangles of its faces.
 
     Raises
     ------
     ExportError
-        If the kernel's mesher fails.
+        If a face has no triangles.
     """
     return png(draw([facets_of_shape(shape)], size, camera))
 

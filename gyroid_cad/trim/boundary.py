@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.surfaces import PartSurface
+from gyroid_cad.trim.surfaces import PartSurface, Quadric
 
-__all__ = ["Boundary", "BoundaryEdge", "BoundaryFace", "Coedge"]
+__all__ = ["Boundary", "BoundaryEdge", "BoundaryFace", "Coedge", "StraightLine"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -28,6 +29,23 @@ _LEAST, _MOST = 9, 2**14
 # Along an edge, to see how far its curves are apart.
 _LOOKED_AT = 101
 _AT_ONCE = 2**21
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StraightLine:
+    """A curve with a constant rate: from parameters (n,) to points and two derivatives, (n, 2) or (n, 3).
+
+    Attributes
+    ----------
+    origin, direction : ndarray, shape (2,) or (3,)
+    """
+
+    origin: Floats
+    direction: Floats
+
+    def __call__(self, t: Floats) -> tuple[Floats, ...]:
+        along = np.broadcast_to(self.direction, (len(t), len(self.direction)))
+        return self.origin + t[:, np.newaxis] * self.direction, along, np.zeros_like(along)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -214,6 +232,119 @@ class Boundary:
             for index, coedge in enumerate(face.coedges):
                 users[coedge.edge].append((number, index))
         return users
+
+    def depths(
+        self, face: Integers, points: Floats, near: Floats | None = None, tangent: bool = False
+    ) -> tuple[Floats, Floats, Floats]:
+        """Depths of points below faces that go on beyond their borders, how they change, and the nearest places.
+
+        Parameters
+        ----------
+        face : ndarray of int, shape (m,)
+        points : ndarray, shape (m, q, 3)
+        near : ndarray, shape (m, q, 2), optional
+            Parameters near those looked for.
+        tangent : bool
+            Whether to measure from the tangent planes there.
+
+        Returns
+        -------
+        depths : ndarray, shape (m, q)
+            In mm, positive inside.
+        inwards : ndarray, shape (m, q, 3)
+            Their gradients.
+        places : ndarray, shape (m, q, 2)
+        """
+        depths, inwards, places = np.empty(points.shape[:2]), np.empty(points.shape), np.empty((*points.shape[:2], 2))
+        flat, others = self._flat_and_others(face)
+        own, normals = self._on_planes(face[flat], points[flat])
+        depths[flat], inwards[flat], places[flat] = own[..., 2], normals[:, None], own[..., :2]
+        for number, some in others:
+            one, shape = self.faces[number], (len(some), points.shape[1])
+            guess = None if near is None else near[some].reshape(-1, 2)
+            if tangent and guess is not None:
+                found = one.surface.tangent_distances(points[some].reshape(-1, 3), guess)
+            else:
+                found = one.surface.distances(points[some].reshape(-1, 3), guess)
+            depths[some] = -one.sign * found[0].reshape(shape)
+            inwards[some] = -one.sign * found[1].reshape(*shape, 3)
+            places[some] = one.unwound(found[2], guess).reshape(*shape, 2)
+        return depths, inwards, places
+
+    def rough_depths(self, face: Integers, points: Floats) -> tuple[Floats, Floats]:
+        """Depths of points (m, q, 3) below faces (m,), and how far off each is at most where it is near zero."""
+        depths, errors = np.empty(points.shape[:2]), np.zeros(points.shape[:2])
+        flat, others = self._flat_and_others(face)
+        _, origins, axes, inwards = self._planes
+        normals = axes[face[flat], 2] * inwards[face[flat], None]
+        depths[flat] = np.einsum("mqi,mi->mq", points[flat], normals) - dot(origins[face[flat]], normals)[:, None]
+        for number, some in others:
+            found, error = self.faces[number].surface.roughly(points[some].reshape(-1, 3))
+            depths[some] = -self.faces[number].sign * found.reshape(depths[some].shape)
+            errors[some] = error.reshape(depths[some].shape)
+        return depths, errors
+
+    def points(self, face: Integers, places: Floats) -> Floats:
+        """Points of faces (m,) at parameters (m, q, 2); shape (m, q, 3)."""
+        points = np.empty((*places.shape[:2], 3))
+        flat, others = self._flat_and_others(face)
+        _, origins, axes, _ = self._planes
+        points[flat] = origins[face[flat], None] + places[flat] @ axes[face[flat], :2]
+        for number, some in others:
+            points[some] = self.faces[number].surface.points(places[some].reshape(-1, 2)).reshape(points[some].shape)
+        return points
+
+    def along_edges(self, edge: Integers, t: Floats) -> tuple[Floats, Floats]:
+        """Points of edges (m,) at parameters (m, ...), and their rates of change; each of shape (m, ..., 3)."""
+        straight, origins, directions = self._lines
+        shape = (-1, *(1,) * (t.ndim - 1), 3)
+        rates = np.broadcast_to(directions[edge].reshape(shape), (*t.shape, 3)).copy()
+        points = origins[edge].reshape(shape) + t[..., None] * rates
+        others = np.flatnonzero(~straight[edge])
+        for number, some in grouped(edge[others]):
+            curve, rows = self.edges[number].curve, others[some]
+            assert curve is not None
+            point, rate, *_ = curve(t[rows].ravel())
+            points[rows], rates[rows] = (values.reshape(points[rows].shape) for values in (point, rate))
+        return points, rates
+
+    @cached_property
+    def _lines(self) -> tuple[Booleans, Floats, Floats]:
+        """A mask of the edges that are straight lines, their origins and directions."""
+        mask, both = np.zeros(len(self.edges), dtype=bool), np.zeros((2, len(self.edges), 3))
+        for number, edge in enumerate(self.edges):
+            if isinstance(edge.curve, StraightLine):
+                mask[number], both[0, number], both[1, number] = True, edge.curve.origin, edge.curve.direction
+        return mask, both[0], both[1]
+
+    def _flat_and_others(self, face: Integers) -> tuple[Integers, list[tuple[int, Integers]]]:
+        """Positions of planes, which are asked all at once; and those of the others, by number."""
+        flat = self._planes[0][face]
+        others = np.flatnonzero(~flat)
+        return np.flatnonzero(flat), [(number, others[some]) for number, some in grouped(face[others])]
+
+    def _on_planes(self, face: Integers, points: Floats) -> tuple[Floats, Floats]:
+        """Parameters and depths of points (m, q, 3) on planes (m,), and the ways inwards (m, 3)."""
+        _, origins, axes, inwards = self._planes
+        own = (points - origins[face, None]) @ axes[face].transpose(0, 2, 1)
+        own[..., 2] *= inwards[face, None]
+        return own, axes[face, 2] * inwards[face, None]
+
+    @cached_property
+    def _planes(self) -> tuple[Booleans, Floats, Floats, Floats]:
+        """A mask of the faces that are planes, their origins and axes, and 1 where the third axis points inwards."""
+        mask, inwards = np.zeros(len(self.faces), dtype=bool), np.ones(len(self.faces))
+        origins, axes = np.zeros((len(self.faces), 3)), np.zeros((len(self.faces), 3, 3))
+        for number, face in enumerate(self.faces):
+            if isinstance(face.surface, Quadric) and face.surface.kind == "plane":
+                mask[number], origins[number], axes[number] = True, face.surface.origin, face.surface.axes
+                inwards[number] = -face.sign * face.surface.handed
+        return mask, origins, axes, inwards
+
+    @cached_property
+    def boxes(self) -> tuple[Floats, Floats]:
+        """Boxes round the faces: their lowest and highest corners, (faces, 3)."""
+        return np.array([face.low for face in self.faces]), np.array([face.high for face in self.faces])
 
     def deviation(self, edge: int) -> float:
         """Largest distance of an edge's curve from its curves on the faces, in mm; its stated tolerance may be less.

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import by_number
 from gyroid_cad.common.processes import results_of
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.boundary import Boundary, BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.ends import ends_of, halved
-from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, by_number, pairs_of
+from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, pairs_of
 from gyroid_cad.trim.loops import decided, linked, nested
 from gyroid_cad.trim.nodes import part_nodes, rim_nodes
 from gyroid_cad.trim.paths import Ends, closed_paths, open_paths

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import by_number
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.edge_crossings import square_points
-from gyroid_cad.trim.lattice_faces import Pairs, by_number
+from gyroid_cad.trim.lattice_faces import Pairs
 from gyroid_cad.trim.nodes import PartNodes, RimNodes
 from gyroid_cad.trim.paths import Ends, Paths
 from gyroid_cad.trim.sections import level_step

@@ -14,7 +14,7 @@ from gyroid_cad.nurbs.surface import edge_row, grid_points, point_derivatives
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["GRID", "LatticeFaces", "Pairs", "by_number", "grouped", "pairs_of"]
+__all__ = ["GRID", "LatticeFaces", "Pairs", "pairs_of"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -119,20 +119,8 @@ class Pairs:
         points : ndarray, shape (m, q, 3)
         """
         points, du, dv = self.faces.derivatives(self.face[pair], u, v)
-        heights, places, slopes = np.empty(u.shape), np.empty((*u.shape, 2)), np.empty((*u.shape, 2))
-        for part, rows in grouped(self.part[pair]):
-            face = self.boundary.faces[part]
-            guess = None if near is None else near[rows].reshape(-1, 2)
-            flat = points[rows].reshape(-1, 3)
-            if tangent and guess is not None:
-                found, gradient, where = face.surface.tangent_distances(flat, guess)
-            else:
-                found, gradient, where = face.surface.distances(flat, guess)
-            inwards = -face.sign * gradient.reshape(*points[rows].shape)
-            heights[rows] = -face.sign * found.reshape(points[rows].shape[:2])
-            places[rows] = face.unwound(where, guess).reshape(*points[rows].shape[:2], 2)
-            slopes[rows] = np.stack([dot(du[rows], inwards), dot(dv[rows], inwards)], axis=-1)
-        return heights, slopes, places, points
+        heights, inwards, places = self.boundary.depths(self.part[pair], points, near, tangent)
+        return heights, np.stack([dot(du, inwards), dot(dv, inwards)], axis=-1), places, points
 
 
 def pairs_of(faces: LatticeFaces, boundary: Boundary) -> Pairs:
@@ -143,27 +131,10 @@ def pairs_of(faces: LatticeFaces, boundary: Boundary) -> Pairs:
     found: list[tuple[Integers, Integers]] = []
     for number, part in enumerate(boundary.faces):
         near = np.flatnonzero(np.all((low <= part.high) & (high >= part.low), axis=1))
-        if len(near):
-            rough, error = part.surface.roughly(middle[near])
-            near = near[np.abs(rough) <= radius[near] + error]
         found.append((near, np.full(len(near), number)))
     face, part_of = (np.concatenate(some) for some in zip(*found, strict=True))
+    rough, error = boundary.rough_depths(part_of, middle[face, None])
+    near = np.abs(rough[:, 0]) <= radius[face] + error[:, 0]
+    face, part_of = face[near], part_of[near]
     order = np.lexsort((part_of, face))
     return Pairs(faces, boundary, face[order], part_of[order])
-
-
-def grouped(numbers: Integers) -> list[tuple[int, Integers]]:
-    """Distinct numbers, each with where it stands."""
-    if not len(numbers):
-        return []
-    order = np.argsort(numbers, kind="stable")
-    distinct, first = np.unique(numbers[order], return_index=True)
-    return list(zip(distinct.tolist(), np.split(order, first[1:]), strict=True))
-
-
-def by_number(numbers: Integers) -> dict[int, list[int]]:
-    """Positions of each number, in order."""
-    found: dict[int, list[int]] = {}
-    for position, number in enumerate(numbers.ravel().tolist()):
-        found.setdefault(number, []).append(position)
-    return found

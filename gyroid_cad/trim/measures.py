@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
@@ -17,6 +17,7 @@ from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.free_surfaces import FreeForm, Swept
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve
+from gyroid_cad.trim.sections import on_section
 from gyroid_cad.trim.surfaces import PartSurface, Quadric
 from gyroid_cad.wall.offset import Wall
 
@@ -28,6 +29,8 @@ Integers = NDArray[np.int64]
 _PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 64
 # Of a face of the part that is no plane, along each parameter.
 _SPANS, _MOST_SPANS = 12, 40
+# So many places at a time.
+_AT_ONCE = 2**12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,25 +70,23 @@ def whole_measures(wall: Wall, whole: list[tuple[int, int, bool]], middle: Float
 def lattice_measures(cut: Crossing, middle: Floats) -> PieceMeasures:
     """Measure the pieces of a wall's faces."""
     wall, faces = cut.faces.wall, cut.faces
+    face = np.array([piece.face for piece in cut.lattice], dtype=np.int64)
+    if not len(face):
+        return PieceMeasures(np.zeros(0), np.zeros(0))
+    places, rates, piece = _square_borders(cut)
+    nets, of_piece = np.unique(
+        np.stack([wall.patch_net[faces.patch[face]], faces.side[face]], axis=1), axis=0, return_inverse=True
+    )
     quadrature = SquareQuadrature(wall.knots)
-    densities: dict[tuple[int, int], Floats] = {}
-    flux, area = [], []
-    for piece in sorted(range(len(cut.lattice)), key=lambda k: _net_of(cut, cut.lattice[k])):
-        loops = cut.lattice[piece]
-        key = _net_of(cut, loops)
-        if key not in densities:
-            # Pieces come in the order of their nets, so that the samples of one are held at a time.
-            densities = {key: quadrature.densities(wall.nets[None, key[0], key[1]], wall.weights)[0]}
-        total = quadrature.over(*_square_border(cut, loops), densities[key])
-        shift = wall.shifts[wall.patch_shift[faces.patch[loops.face]]] - middle
-        sign = -1.0 if cut.backwards[loops.face] else 1.0
-        flux.append((piece, sign * (total[0] + shift @ total[1:4] / 3)))
-        area.append((piece, total[4]))
-    return PieceMeasures(_in_order(flux), _in_order(area))
-
-
-def _net_of(cut: Crossing, loops: CutLoops) -> tuple[int, int]:
-    return int(cut.faces.wall.patch_net[cut.faces.patch[loops.face]]), int(cut.faces.side[loops.face])
+    sums = np.zeros((len(face), 5))
+    # Places come in the order of their nets, so that the samples of one are held at a time.
+    for net, some in grouped(of_piece.ravel()[piece]):
+        density = quadrature.densities(wall.nets[None, nets[net, 0], nets[net, 1]], wall.weights)[0]
+        for rows in np.split(some, range(_AT_ONCE, len(some), _AT_ONCE)):
+            np.add.at(sums, piece[rows], quadrature.shares(places[rows], rates[rows], density))
+    shift = wall.shifts[wall.patch_shift[faces.patch[face]]] - middle
+    sign = np.where(cut.backwards[face], -1.0, 1.0)
+    return PieceMeasures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
 
 
 def _in_order(found: list[tuple[int, float]]) -> Floats:
@@ -95,25 +96,52 @@ def _in_order(found: list[tuple[int, float]]) -> Floats:
 Stretch = tuple[Floats, Floats, Floats, Floats]
 
 
-def _square_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:
-    """Places along a piece's border in the square, and weights times the rate of v."""
-    complex, patch = cut.faces.wall.complex, int(cut.faces.patch[piece.face])
-    sides = complex.patch_edges[patch].tolist()
+def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
+    """Places along the borders of all pieces in the square, weights times the rates of v there, and the pieces."""
+    uses = [
+        (piece, edge, forward, len(loop), position)
+        for piece, loops in enumerate(cut.lattice)
+        for loop in loops.loops
+        for position, (edge, forward) in enumerate(loop)
+    ]
+    piece, edge, forward, length, position = np.array(uses, dtype=np.int64).T
+    index = np.arange(len(piece))
+    following = np.where(position + 1 < length, index + 1, index - position)
+    section = np.array([cut.edges[number].kind == "section" for number in edge.tolist()])
+    number = np.array([cut.edges[number].number for number in edge.tolist()])
+    limits = np.array([(cut.edges[number].first, cut.edges[number].last) for number in edge.tolist()])
+    turn = np.where(forward, 1.0, -1.0)
 
-    def stretch(edge: CutEdge, forward: bool) -> Stretch:
-        if edge.kind == "section":
-            return _along(cut.sections[edge.number], SectionCurve.square)
-        side = sides.index(edge.number % complex.edge_count)
-        sign = 1.0 if complex.edge_forward[patch, side] else -1.0
-        # Of the other sides either the integral or the rate is 0.
-        pieces = _RIM_PIECES if side == 1 else 1
-        t, weights = gauss_points(np.linspace(edge.first, edge.last, pieces + 1), _PER_STRETCH)
-        places = np.stack(square_points(side, sign * t), axis=-1)
-        ends = np.stack(square_points(side, sign * np.array([edge.first, edge.last])), axis=-1)
-        rate = (0.0, 1.0, 0.0, -1.0)[side] * sign
-        return places, np.full(len(t), rate), weights, ends
+    complex = cut.faces.wall.complex
+    patch = cut.faces.patch[[cut.lattice[k].face for k in piece.tolist()]]
+    side = np.argmax(complex.patch_edges[patch] == (number % complex.edge_count)[:, None], axis=1)
+    sign = np.where(complex.edge_forward[patch, side], 1.0, -1.0)
+    ends = np.stack(square_points(side[:, None], sign[:, None] * limits), axis=-1)
+    sections = {k: cut.sections[number[k]].in_square for k in np.flatnonzero(section).tolist()}
+    for k, control in sections.items():
+        ends[k] = control[[0, -1]]
+    ends = np.where((turn > 0)[:, None, None], ends, ends[:, ::-1])
+    # Where two stretches meet, what is between their ends is part of the border too: not all curves quite meet.
+    starts, stops = ends[following, 0], ends[:, 1]
+    places, rates, pieces = [(stops + starts) / 2], [(starts - stops)[:, 1]], [piece]
 
-    return _border(cut, piece, stretch)
+    # Of the integral from u = -1 the sides 0, 2 and 3 have nothing: either it is 0 there, or v does not change.
+    rim = np.flatnonzero(~section & (side == 1))
+    t, weights = gauss_points(np.linspace(0, 1, _RIM_PIECES + 1), _PER_STRETCH)
+    span = np.diff(limits[rim], axis=1)
+    v = sign[rim, None] * (limits[rim, :1] + span * t)
+    places.append(np.stack([np.ones_like(v), v], axis=-1).reshape(-1, 2))
+    rates.append(((turn * sign)[rim, None] * span * weights).ravel())
+    pieces.append(np.repeat(piece[rim], len(t)))
+    rows = np.flatnonzero(section)
+    for count, some in grouped(np.array([len(sections[k]) for k in rows.tolist()], dtype=np.int64)):
+        stacked = np.stack([sections[k] for k in rows[some].tolist()], axis=1)
+        t, weights = _gauss_between(count)
+        at, rate = (on_section(stacked.reshape(count, -1), t, order).reshape(len(t), -1, 2) for order in (0, 1))
+        places.append(at.reshape(-1, 2))
+        rates.append((turn[rows[some]] * weights[:, None] * rate[..., 1]).ravel())
+        pieces.append(np.tile(piece[rows[some]], len(t)))
+    return np.concatenate(places), np.concatenate(rates), np.concatenate(pieces)
 
 
 def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], Stretch]) -> tuple[Floats, Floats]:
@@ -158,7 +186,7 @@ class _Samples:
     def __init__(self, face: BoundaryFace, middle: Floats) -> None:
         self.low, high = face.range
         self.scale = (high - self.low) / 2
-        self.quadrature = SquareQuadrature(self._knots(face.surface))
+        self.quadrature = _quadrature(self._knots(face.surface).tobytes())
         nodes = self.quadrature.places
         grid = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
         places = self.low + self.scale * (grid + 1)
@@ -183,6 +211,12 @@ class _Samples:
     def over(self, places: Floats, rates: Floats) -> Floats:
         square = np.clip((places - self.low) / self.scale - 1, -1, 1)
         return self.quadrature.over(square, rates / self.scale[1], self.density)
+
+
+@lru_cache(maxsize=8)
+def _quadrature(knots: bytes) -> SquareQuadrature:
+    """Most faces have the same knots: those of planes, or of quadrics."""
+    return SquareQuadrature(np.frombuffer(knots))
 
 
 def _part_border(cut: Crossing, piece: CutLoops) -> tuple[Floats, Floats]:

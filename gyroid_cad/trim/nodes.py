@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.roots import foot_step, roots
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.trim.edge_crossings import square_points
-from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, grouped
+from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs
 
 __all__ = ["PartNodes", "RimNodes", "part_nodes", "rim_nodes"]
 
@@ -145,29 +145,20 @@ def _may_cross(pairs: Pairs, face: Integers, side: Integers, part: Integers) -> 
     """Mask of the sides that come as near a face of the part as they reach between a few places."""
     points = pairs.faces.along_sides(face, side, np.linspace(-1, 1, _LOOKED_AT))
     reach = np.linalg.norm(np.diff(points, axis=1), axis=2).max(axis=1)
-    near = np.zeros(len(face), dtype=bool)
     bottom, top = points.min(axis=1) - reach[:, None], points.max(axis=1) + reach[:, None]
-    low, high = (np.array([getattr(box, name) for box in pairs.boundary.faces])[part] for name in ("low", "high"))
-    boxed = np.flatnonzero(np.all((bottom <= high) & (top >= low), axis=1))
-    for number, some in grouped(part[boxed]):
-        rows = boxed[some]
-        found, error = pairs.boundary.faces[number].surface.roughly(points[rows].reshape(-1, 3))
-        near[rows] = np.min((np.abs(found) - error).reshape(len(rows), -1), axis=1) <= reach[rows]
-    return near
+    low, high = (some[part] for some in pairs.boundary.boxes)
+    near = np.all((bottom <= high) & (top >= low), axis=1)
+    found, error = pairs.boundary.rough_depths(part[near], points[near])
+    near[near] = np.min(np.abs(found) - error, axis=1) <= reach[near]
+    return np.asarray(near)
 
 
 def _rough_heights(pairs: Pairs, side: Integers, samples: Floats, size: float) -> Floats:
     """Heights along sides, exact where they are near zero; shape (pairs, samples)."""
     points = pairs.faces.along_sides(pairs.face, side, samples)
-    heights = np.empty(points.shape[:2])
-    for part, rows in grouped(pairs.part):
-        face = pairs.boundary.faces[part]
-        flat = points[rows].reshape(-1, 3)
-        found, error = face.surface.roughly(flat)
-        near = np.flatnonzero((np.abs(found) <= 4 * error) & (error > 0) & (np.abs(found) < size))
-        if len(near):
-            found[near] = face.surface.distances(flat[near])[0]
-        heights[rows] = -face.sign * found.reshape(len(rows), -1)
+    heights, error = pairs.boundary.rough_depths(pairs.part, points)
+    row, sample = np.nonzero((np.abs(heights) <= 4 * error) & (error > 0) & (np.abs(heights) < size))
+    heights[row, sample] = pairs.boundary.depths(pairs.part[row], points[row, sample, None])[0][:, 0]
     return heights
 
 
@@ -254,13 +245,13 @@ def _tried(
     for first in range(0, len(face), _AT_ONCE):
         rows = np.arange(first, min(first + _AT_ONCE, len(face)))
         ends = np.stack([low[rows], high[rows]], axis=1)
-        points, _ = _along_edges(boundary, edge[rows], ends)
+        points, _ = boundary.along_edges(edge[rows], ends)
         heights, _ = _heights(faces, face[rows], points)
         length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         # No place of a segment is further from one of its ends than its length.
         rows = rows[np.abs(heights).min(axis=1) <= length]
         t = low[rows, None] + parts * (high - low)[rows, None]
-        points, _ = _along_edges(boundary, edge[rows], t)
+        points, _ = boundary.along_edges(edge[rows], t)
         heights, places = _heights(faces, face[rows], points)
         above = heights > 0
         row, index = np.nonzero(above[:, 1:] != above[:, :-1])
@@ -282,17 +273,6 @@ def _between(
     along = t[row, index] + share * (t[row, index + 1] - t[row, index])
     place = places[row, index] + share[:, None] * (places[row, index + 1] - places[row, index])
     return rows[row], along, place[:, 0], place[:, 1]
-
-
-def _along_edges(boundary: Boundary, edge: Integers, t: Floats) -> tuple[Floats, Floats]:
-    """Points of edges (m,) at parameters (m, ...), and their rates of change; each of shape (m, ..., 3)."""
-    points, rates = np.empty((*t.shape, 3)), np.empty((*t.shape, 3))
-    for number, rows in grouped(edge):
-        curve = boundary.edges[number].curve
-        assert curve is not None
-        point, rate, *_ = curve(t[rows].ravel())
-        points[rows], rates[rows] = (some.reshape(points[rows].shape) for some in (point, rate))
-    return points, rates
 
 
 def _heights(faces: LatticeFaces, face: Integers, points: Floats) -> tuple[Floats, Floats]:
@@ -330,7 +310,7 @@ def _converged(
     longest = np.stack([(last - first) / 10, np.full(len(edge), 0.2), np.full(len(edge), 0.2)], axis=-1)
     some = np.arange(len(edge))
     for step in range(_NEWTON_STEPS + 1):
-        place, rate = _along_edges(boundary, edge[some], unknown[some, 0])
+        place, rate = boundary.along_edges(edge[some], unknown[some, 0])
         u, v = unknown[some, 1:, None].transpose(1, 0, 2)
         point, du, dv = (value[:, 0] for value in faces.derivatives(face[some], u, v))
         normal = np.cross(du, dv)

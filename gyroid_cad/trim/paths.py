@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.arrays import by_number, grouped
 from gyroid_cad.errors import KernelError
-from gyroid_cad.trim.lattice_faces import GRID, Pairs, by_number, grouped
+from gyroid_cad.trim.lattice_faces import GRID, Pairs
 from gyroid_cad.trim.sections import level_step
 
 __all__ = ["Ends", "Paths", "closed_paths", "open_paths"]
@@ -266,26 +267,23 @@ def _above(pairs: Pairs, rows: Integers, points: Floats, which: Integers) -> Boo
     """Signs of heights on a grid: looked at closely only where those of a coarser one leave a change possible."""
     coarse = points[:, ::_COARSE, ::_COARSE]
     reach = sum(np.linalg.norm(np.diff(coarse, axis=axis), axis=-1).max(axis=(1, 2)) for axis in (1, 2))
-    above = np.empty((len(rows), GRID, GRID), dtype=bool)
-    for part, some in grouped(pairs.part[rows]):
-        face = pairs.boundary.faces[part]
-        found, error = face.surface.roughly(coarse[which[some]].reshape(-1, 3))
-        count = coarse.shape[1]
-        heights, error = (values.reshape(len(some), count, count) for values in (-face.sign * found, error))
-        close = np.abs(heights) - error <= reach[which[some], None, None]
-        # The cells round each such place, on the finer grid.
-        cells = close[:, :-1, :-1] | close[:, 1:, :-1] | close[:, :-1, 1:] | close[:, 1:, 1:]
-        above[some] = np.kron(heights > 0, np.ones((_COARSE, _COARSE), dtype=bool))[:, :GRID, :GRID]
-        row, i, j = np.nonzero(cells)
-        offsets = np.arange(_COARSE + 1)
-        at_i = (_COARSE * i)[:, None, None] + offsets[:, None] + 0 * offsets
-        at_j = (_COARSE * j)[:, None, None] + offsets + 0 * offsets[:, None]
-        at = np.broadcast_to(row[:, None, None], at_i.shape)
-        fine = np.zeros((len(some), GRID, GRID), dtype=bool)
-        fine[at, at_i, at_j] = True
-        at, at_i, at_j = np.nonzero(fine)
-        exact = face.surface.roughly(points[which[some]][at, at_i, at_j])[0]
-        above[some[at], at_i, at_j] = -face.sign * exact > 0
+    count = coarse.shape[1]
+    heights, error = pairs.boundary.rough_depths(pairs.part[rows], coarse[which].reshape(len(rows), -1, 3))
+    heights, error = heights.reshape(-1, count, count), error.reshape(-1, count, count)
+    close = np.abs(heights) - error <= reach[which, None, None]
+    # The cells round each such place, on the finer grid.
+    cells = close[:, :-1, :-1] | close[:, 1:, :-1] | close[:, :-1, 1:] | close[:, 1:, 1:]
+    above = np.kron(heights > 0, np.ones((_COARSE, _COARSE), dtype=bool))[:, :GRID, :GRID]
+    row, i, j = np.nonzero(cells)
+    offsets = np.arange(_COARSE + 1)
+    at_i = (_COARSE * i)[:, None, None] + offsets[:, None] + 0 * offsets
+    at_j = (_COARSE * j)[:, None, None] + offsets + 0 * offsets[:, None]
+    at = np.broadcast_to(row[:, None, None], at_i.shape)
+    fine = np.zeros((len(rows), GRID, GRID), dtype=bool)
+    fine[at, at_i, at_j] = True
+    at, at_i, at_j = np.nonzero(fine)
+    exact, _ = pairs.boundary.rough_depths(pairs.part[rows[at]], points[which[at], at_i, at_j, None])
+    above[at, at_i, at_j] = exact[:, 0] > 0
     return above
 
 
@@ -293,7 +291,7 @@ def _in_boxes(pairs: Pairs, rows: Integers, points: Floats, which: Integers, ask
     """Mask of the cells, of those asked for, that come into the box of the part's face."""
     found = np.zeros(asked.shape, dtype=bool)
     row, i, j = np.nonzero(asked)
-    low, high = (np.array([getattr(face, name) for face in pairs.boundary.faces]) for name in ("low", "high"))
+    low, high = pairs.boundary.boxes
     part = pairs.part[rows[row]]
     corners = np.stack([points[which[row], i + di, j + dj] for di in (0, 1) for dj in (0, 1)])
     bottom, top = corners.min(axis=0), corners.max(axis=0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.basis import basis
-from gyroid_cad.trim.lattice_faces import Pairs, grouped
+from gyroid_cad.trim.lattice_faces import Pairs
 from gyroid_cad.trim.paths import Paths
 from gyroid_cad.trim.sections import chord_lengths, level_step, on_section, section_knots, spread_along
 
@@ -177,11 +177,8 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     u, v = np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1)
     exact = pairs.faces.derivatives(pairs.face[pair], u, v, 0)[0]
     deviation = np.linalg.norm(exact - between[..., 2:5], axis=-1).max(axis=1)
-    for part, rows in grouped(pairs.part[pair]):
-        surface = pairs.boundary.faces[part].surface
-        on_part = surface.points(between[rows, :, 5:].reshape(-1, 2)).reshape(len(rows), -1, 3)
-        off = np.linalg.norm(on_part - between[rows, :, 2:5], axis=-1).max(axis=1)
-        deviation[rows] = np.maximum(deviation[rows], off)
+    on_part = pairs.boundary.points(pairs.part[pair], between[..., 5:])
+    deviation = np.maximum(deviation, np.linalg.norm(on_part - between[..., 2:5], axis=-1).max(axis=1))
     return control, np.where(crowded | astray | ~np.isfinite(deviation), np.inf, deviation)
 
 

@@ -83,7 +83,7 @@ class Quadric:
         own = (points - self.origin) @ self.axes.T
         x, y, z = own.T
         if self.kind == "plane":
-            return self._handed * z, np.broadcast_to(self._handed * self.axes[2], own.shape), own[:, :2]
+            return self.handed * z, np.broadcast_to(self.handed * self.axes[2], own.shape), own[:, :2]
         # Past the axis a meridian is that of the opposite angle, at a negative distance.
         side = -1.0 if self.crossed else 1.0
         along = side * np.hypot(x, y)
@@ -103,7 +103,7 @@ class Quadric:
             out = along - self.radius
             found, height = np.hypot(out, z) - self.second, np.arctan2(z, out)
             gradient = unit(out[:, np.newaxis] * radial + z[:, np.newaxis] * upwards)
-        sign = side * self._handed
+        sign = side * self.handed
         return sign * found, sign * gradient @ self.axes, np.stack([angle, height], axis=-1)
 
     def tangent_distances(self, points: Floats, near: Floats) -> tuple[Floats, Floats, Floats]:
@@ -141,14 +141,14 @@ class Quadric:
             minor = self.radius if self.kind == "sphere" else self.second
             outwards = np.stack([np.cos(t) * cosine, np.cos(t) * sine, np.sin(t)], axis=-1)
             own = minor * self._profile(t)[0][:, np.newaxis] * outwards
-        return np.asarray(self._handed * own @ self.axes)
+        return np.asarray(self.handed * own @ self.axes)
 
     def crosses_at(self, place: Floats) -> bool:
         """Tell whether the profile has crossed the axis at parameters, shape (2,)."""
         return self.kind != "plane" and float(self._profile(place[1:])[0][0]) < 0
 
     @property
-    def _handed(self) -> float:
+    def handed(self) -> float:
         """-1 if the axes are left-handed: then the normal of the parameters points inwards."""
         return 1.0 if np.linalg.det(self.axes) > 0 else -1.0
 

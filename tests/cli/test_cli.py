@@ -166,7 +166,7 @@ def test_options_reach_the_file(capsys: Captured, tmp_path: Path) -> None:
     assert "AP242" in (tmp_path / "a.step").read_text()[:1000]
 
 
-def test_the_angle_reaches_the_kernels_triangles_of_a_trimmed_lattice(capsys: Captured, tmp_path: Path) -> None:
+def test_the_angle_reaches_the_triangles_of_a_trimmed_lattice(capsys: Captured, tmp_path: Path) -> None:
     sizes = []
     for angle in ("40", "10"):
         settings = ["--trim", "box", "--deviation", "0.5", "--angle", angle]

@@ -13,9 +13,15 @@ from hypothesis import HealthCheck, given, settings
 from numpy.typing import NDArray
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
-from OCP.GeomAbs import GeomAbs_BSplineSurface, GeomAbs_OffsetSurface
+from OCP.GeomAbs import (
+    GeomAbs_BSplineSurface,
+    GeomAbs_Cylinder,
+    GeomAbs_OffsetSurface,
+    GeomAbs_Sphere,
+    GeomAbs_SurfaceType,
+)
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
-from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 
 import gyroid_cad.kernel.sieve
 from gyroid_cad.errors import KernelError, ParameterError
@@ -76,6 +82,41 @@ def test_a_core_of_pieces_has_the_volume_that_geometry_gives(
     assert len(core) == solids
     assert all(is_valid(one) and topology(one).closed for one in core)
     assert sum(measure(one)[0] for one in core) == pytest.approx(volume, rel=1e-5)
+
+
+def capsule() -> bd.Part:
+    """A cylinder that passes into half a ball."""
+    return bd.Pos(0, 0, -4) * bd.Cylinder(6, 8) + bd.Sphere(6)
+
+
+def faces_of(solid: TopoDS_Solid, kind: GeomAbs_SurfaceType) -> list[TopoDS_Face]:
+    faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
+    return [face for face in faces if BRepAdaptor_Surface(face).GetType() == kind]
+
+
+@pytest.mark.parametrize(
+    ("made", "kind", "volume"),
+    [
+        (bd.Sphere(10) - bd.Cylinder(4, 20), GeomAbs_Cylinder, 4 / 3 * np.pi * 65**1.5),
+        (bd.Sphere(10) - bd.Cylinder(4, 20), GeomAbs_Sphere, None),
+        (capsule(), GeomAbs_Sphere, None),
+        (capsule(), GeomAbs_Cylinder, None),
+    ],
+    ids=["bore", "ball", "dome", "mantle"],
+)
+def test_openings_may_be_curved_and_smooth_at_their_borders(
+    made: bd.Shape, kind: GeomAbs_SurfaceType, volume: float | None
+) -> None:
+    solid = solid_of(made)
+    openings = faces_of(solid, kind)
+    core = core_of_pieces(solid, 1.0, openings)
+    assert all(is_valid(one) and topology(one).closed for one in core)
+    assert Depths(solid, openings).confirm(core, 1.0)
+    if volume is not None:
+        assert sum(measure(one)[0] for one in core) == pytest.approx(volume, rel=1e-5)
+    made_hollow = hollow(require_part(solid), 1.0, openings)
+    assert any(made_hollow.opened)
+    assert made_hollow.core.volume == pytest.approx(sum(measure(one)[0] for one in core), rel=1e-4)
 
 
 def test_a_rib_thinner_than_two_skins_has_no_core() -> None:
@@ -152,8 +193,9 @@ def test_tubes_that_touch_before_they_cross_are_cut_where_places_are_called_one_
 
 
 def test_where_it_does_not_close_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    def all_but_one(*arguments: object) -> list[TopoDS_Shape]:
-        return pieces(*arguments)[1:]  # type: ignore[arg-type]
+    def all_but_one(*arguments: object) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:
+        kept, opened = pieces(*arguments)  # type: ignore[arg-type]
+        return kept[1:], opened
 
     pieces = gyroid_cad.kernel.sieve.offset_pieces
     monkeypatch.setattr(gyroid_cad.kernel.sieve, "offset_pieces", all_but_one)

@@ -184,7 +184,8 @@ PLATE = rounded(18, 14, 2) - np.pi * 3.5**2
         (plate(), [], 4 * PLATE, 1),
         (plate(), [">Z"], 5 * PLATE, 1),
         (plate(), [">Z", "<Z"], 6 * PLATE, 1),
-        (plate(), [">X"], 4 * PLATE + (10 - 2) * (6 - 2), 1),
+        # Where the opening passes into round corners the skin keeps its thickness from these: a quarter of a tube.
+        (plate(), [">X"], 4 * PLATE + (10 - np.pi / 2) * (6 - 2), 1),
         (box(), [">Z", ">X"], 8 * 6 * 6, 1),
         (bd.Cylinder(6, 14), ["mantle"], 36 * np.pi * 12, 1),
         (bd.Torus(10, 4), [], 2 * np.pi**2 * 10 * 9, 1),
@@ -253,6 +254,18 @@ def test_an_offset_that_is_none_is_never_believed(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", wrong)
     with pytest.raises(KernelError, match="cannot offset the part by 1 mm"):
         parted(box())
+
+
+def test_a_refusal_names_the_face_that_is_bent_too_narrowly_and_what_can_be_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # At its ends an ellipse of half axes a and b has the radius b2 / a, at its sides a2 / b.
+    prism = bd.extrude(bd.make_face(bd.Ellipse(6, 3).edges()), 12)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", lambda *arguments: (None for _ in CLOSED_WAYS))
+    with pytest.raises(KernelError, match=r"below 1\.5\d* mm no offset folds .* face \d is bent at \("):
+        hollow(require_part(wrapped(prism)), 2.0)
+    with pytest.raises(KernelError, match="by 1 mm; another thickness may do"):
+        hollow(require_part(wrapped(prism)), 1.0)
 
 
 def crashes(*arguments: str) -> None:

@@ -68,7 +68,7 @@ def test_a_lattice_that_cannot_be_says_why_in_place_of_its_picture(outputs: list
     assert "<img" not in outputs[2]["text/html"]
 
 
-def test_a_trimmed_lattice_and_a_filled_part_are_shown_by_the_kernels_triangles() -> None:
+def test_a_trimmed_lattice_and_a_filled_part_are_shown_by_the_triangles_of_their_faces() -> None:
     trimmed = Lattice((1, 1, 1), 10, 0.8, fit=FitSettings(5), trim="box")
     filled = fill(cq.Workplane().box(6, 5, 4), 10, 0.8, fit=FitSettings(5), material_density=2.7)
     for thing, words in ((trimmed, "10 x 10 x 10 mm"), (filled, "cells of 10 mm")):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -199,22 +200,24 @@ class _Reading:
         on_ball = isinstance(geometry, Geom_SphericalSurface)
         if not wires:
             raise UnknownGeometryError("a face without a border")
-        loops = [self._loop(wire, face, on_ball) for wire in wires]
+        loops = [loop for wire in wires for loop in self._loops(wire, face, on_ball)]
         return _Face(surface, (_along(face) != turned), loops)
 
-    def _loop(self, wire: TopoDS_Shape, face: TopoDS_Face, on_ball: bool) -> _Loop:
+    def _loops(self, wire: TopoDS_Shape, face: TopoDS_Face, on_ball: bool) -> list[_Loop]:
         if wire.ShapeType() != TopAbs_WIRE:
             raise UnknownGeometryError("a face with more than wires")
         edges = [as_edge(edge) for edge in _children(wire)]
         uses = [self._use(edge, face) for edge in edges if not BRep_Tool.Degenerated_s(edge)]
-        # The whole of a ball has no border: its seam, and its poles, are the kernel's own affair.
-        whole_ball = on_ball and len(edges) == 4 and len(uses) == 2 and uses[0][0] == uses[1][0]
-        if whole_ball or not uses:
-            pole = next(edge for edge in edges if BRep_Tool.Degenerated_s(edge))
-            return _Loop([], self._vertex(TopExp.FirstVertex_s(pole)))
+        if on_ball and sum(map(BRep_Tool.Degenerated_s, edges)) == 2:
+            # The seam of a ball and its poles are the kernel's own affair. Readers, the kernel's among them, lose their
+            # way along a border that runs to both poles and back.
+            times = Counter(edge for edge, _ in uses)
+            return self._closed_loops([use for use in uses if times[use[0]] == 1]) or [self._pole(edges)]
+        if not uses:
+            return [self._pole(edges)]
         for some in (uses, uses[::-1]):
             if self._joined(some):
-                return _Loop(some)
+                return [_Loop(some)]
         explorer, ordered = BRepTools_WireExplorer(as_wire(wire), as_face(face.Oriented(TopAbs_FORWARD))), []
         while explorer.More():
             if not BRep_Tool.Degenerated_s(explorer.Current()):
@@ -222,11 +225,34 @@ class _Reading:
             explorer.Next()
         if sorted(ordered) != sorted(uses) or not self._joined(ordered):
             raise UnknownGeometryError("a wire that does not close")
-        return _Loop(ordered)
+        return [_Loop(ordered)]
+
+    def _pole(self, edges: list[TopoDS_Edge]) -> _Loop:
+        pole = next(edge for edge in edges if BRep_Tool.Degenerated_s(edge))
+        return _Loop([], self._vertex(TopExp.FirstVertex_s(pole)))
+
+    def _closed_loops(self, uses: list[Use]) -> list[_Loop]:
+        """Join uses end to end."""
+        left, loops = list(uses), []
+        while left:
+            loop = [left.pop(0)]
+            while self._ends(loop[-1])[1] != self._ends(loop[0])[0]:
+                following = next((use for use in left if self._ends(use)[0] == self._ends(loop[-1])[1]), None)
+                if following is None:
+                    raise UnknownGeometryError("a wire that does not close")
+                left.remove(following)
+                loop.append(following)
+            loops.append(_Loop(loop))
+        return loops
+
+    def _ends(self, use: Use) -> tuple[int, int]:
+        """Vertices where a use of an edge begins and ends."""
+        first, last, _ = self.read.edges[use[0]]
+        return (first, last) if use[1] else (last, first)
 
     def _joined(self, uses: list[Use]) -> bool:
         """Tell whether every edge ends where the next begins."""
-        ends = [self.read.edges[edge][:2] if along else self.read.edges[edge][1::-1] for edge, along in uses]
+        ends = [self._ends(use) for use in uses]
         return all(end == start for (_, end), (start, _) in zip(ends, [*ends[1:], ends[0]], strict=True))
 
     def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:

@@ -226,13 +226,18 @@ def _exchanged(work: _Work) -> _Work:
 
 def _near_enough(work: _Work, limit: float) -> _Work:
     """Triangles parted until the middles of their sides inside the faces are near enough."""
+    looked_at = np.ones(len(work.scale), dtype=bool)
     for _ in range(_ROUNDS):
         one, other = shared_sides(work.triangles)
+        owner = work.owner[work.triangles[one // 3, 0]]
+        some = looked_at[owner]
+        one, other, owner = one[some], other[some], owner[some]
         off = _off(work, one)
         far = off > limit
         if not far.any():
             break
         work = _exchanged(_with_middles(work, one[far], other[far], off[far]))
+        looked_at = np.bincount(owner[far], minlength=len(looked_at)) > 0
     return work
 
 

@@ -141,7 +141,7 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
 
 
 def _on_sides(cut: Crossing, patch: Integers, edges: list[CutEdge]) -> tuple[Integers, Floats]:
-    """Sides of patches that edges lie on where they are rims, and where those end along the sides, run round the square."""
+    """Sides of patches that edges lie on where they are rims, and where those end along them, run round the square."""
     complex = cut.faces.wall.complex
     number = np.array([edge.number for edge in edges])
     side = np.argmax(complex.patch_edges[patch] == (number % complex.edge_count)[:, None], axis=1)

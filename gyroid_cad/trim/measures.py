@@ -107,19 +107,16 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
     piece, edge, forward, length, position = np.array(uses, dtype=np.int64).T
     index = np.arange(len(piece))
     following = np.where(position + 1 < length, index + 1, index - position)
-    section = np.array([cut.edges[number].kind == "section" for number in edge.tolist()])
-    number = np.array([cut.edges[number].number for number in edge.tolist()])
-    limits = np.array([(cut.edges[number].first, cut.edges[number].last) for number in edge.tolist()])
+    edges = [cut.edges[number] for number in edge.tolist()]
+    section = np.array([one.kind == "section" for one in edges])
     turn = np.where(forward, 1.0, -1.0)
 
-    complex = cut.faces.wall.complex
     patch = cut.faces.patch[[cut.lattice[k].face for k in piece.tolist()]]
-    side = np.argmax(complex.patch_edges[patch] == (number % complex.edge_count)[:, None], axis=1)
-    sign = np.where(complex.edge_forward[patch, side], 1.0, -1.0)
-    ends = np.stack(square_points(side[:, None], sign[:, None] * limits), axis=-1)
-    sections = {k: cut.sections[number[k]].in_square for k in np.flatnonzero(section).tolist()}
-    for k, control in sections.items():
-        ends[k] = control[[0, -1]]
+    side, limits = _on_sides(cut, patch, edges)
+    ends = np.stack(square_points(side[:, None], limits), axis=-1)
+    rows = np.flatnonzero(section)
+    curves = [cut.sections[edges[k].number].in_square for k in rows.tolist()]
+    ends[rows] = np.array([control[[0, -1]] for control in curves]).reshape(-1, 2, 2)
     ends = np.where((turn > 0)[:, None, None], ends, ends[:, ::-1])
     # Where two stretches meet, what is between their ends is part of the border too: not all curves quite meet.
     starts, stops = ends[following, 0], ends[:, 1]
@@ -129,19 +126,27 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
     rim = np.flatnonzero(~section & (side == 1))
     t, weights = gauss_points(np.linspace(0, 1, _RIM_PIECES + 1), _PER_STRETCH)
     span = np.diff(limits[rim], axis=1)
-    v = sign[rim, None] * (limits[rim, :1] + span * t)
+    v = limits[rim, :1] + span * t
     places.append(np.stack([np.ones_like(v), v], axis=-1).reshape(-1, 2))
-    rates.append(((turn * sign)[rim, None] * span * weights).ravel())
+    rates.append((turn[rim, None] * span * weights).ravel())
     pieces.append(np.repeat(piece[rim], len(t)))
-    rows = np.flatnonzero(section)
-    for count, some in grouped(np.array([len(sections[k]) for k in rows.tolist()], dtype=np.int64)):
-        stacked = np.stack([sections[k] for k in rows[some].tolist()], axis=1)
+    for count, some in grouped(np.array([len(control) for control in curves], dtype=np.int64)):
+        stacked = np.stack([curves[k] for k in some.tolist()], axis=1).reshape(count, -1)
         t, weights = _gauss_between(count)
-        at, rate = (on_section(stacked.reshape(count, -1), t, order).reshape(len(t), -1, 2) for order in (0, 1))
+        at, rate = (on_section(stacked, t, order).reshape(len(t), -1, 2) for order in (0, 1))
         places.append(at.reshape(-1, 2))
         rates.append((turn[rows[some]] * weights[:, None] * rate[..., 1]).ravel())
         pieces.append(np.tile(piece[rows[some]], len(t)))
     return np.concatenate(places), np.concatenate(rates), np.concatenate(pieces)
+
+
+def _on_sides(cut: Crossing, patch: Integers, edges: list[CutEdge]) -> tuple[Integers, Floats]:
+    """Sides of patches that edges lie on where they are rims, and where those end along them, run round the square."""
+    complex = cut.faces.wall.complex
+    number = np.array([edge.number for edge in edges])
+    side = np.argmax(complex.patch_edges[patch] == (number % complex.edge_count)[:, None], axis=1)
+    sign = np.where(complex.edge_forward[patch, side], 1.0, -1.0)
+    return side, sign[:, None] * np.array([(edge.first, edge.last) for edge in edges])
 
 
 def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], Stretch]) -> tuple[Floats, Floats]:

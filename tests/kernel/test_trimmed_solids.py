@@ -61,6 +61,7 @@ def trimmed(
     st.tuples(*3 * [st.sampled_from([0.0, 17.0, 90.0])]),
 )
 @example(np.array([1.75, 0, 0]), np.array([1.0, 1, 3]), 1.0, SHEET, (0.0, 0.0, 0.0))
+@example(np.array([0, 7.09375, 0]), np.array([1.0625, 1, 3.952]), 1.625, SHEET, (0.0, 17.0, 90.0))
 def test_solids_are_valid_closed_and_of_the_volume_that_was_integrated(
     low: Floats,
     extent: Floats,
@@ -82,8 +83,8 @@ def test_solids_are_valid_closed_and_of_the_volume_that_was_integrated(
         scale = float(np.prod(extent))
         measured = measure(solid)
         assert measured[0] == pytest.approx(volume, abs=1e-5 * scale)
-        # The kernel's default integral of an area is off by up to 6e-5 of it on these faces.
-        assert measured[1] == pytest.approx(area, rel=1e-4)
+        # The kernel's default integral of an area is off by up to 6e-5 of it on these faces, on slivers by more.
+        assert measured[1] == pytest.approx(area, rel=1e-4, abs=1e-5 * scale ** (2 / 3))
     counted = topology(compound_of(solids))
     assert counted.faces == len(cut.faces) + len(cut.caps)
 

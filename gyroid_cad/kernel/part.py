@@ -17,6 +17,7 @@ from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
+from OCP.ShapeFix import ShapeFix_Shape
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
@@ -230,7 +231,14 @@ def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
     divide = ShapeUpgrade_ShapeDivideClosed(shape)
     divide.Perform()
     divided = divide.Result()
-    return shape if divided is None or divided.IsNull() or not is_valid(divided) else divided
+    if divided is None or divided.IsNull():
+        return shape
+    if is_valid(divided):
+        return divided
+    # New edges may be left with curves that do not run alike.
+    fix = ShapeFix_Shape(divided)
+    fix.Perform()
+    return fix.Shape() if is_valid(fix.Shape()) else shape
 
 
 def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:

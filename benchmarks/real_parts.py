@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
+from OCP.TopoDS import TopoDS_Shape
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
@@ -57,8 +58,8 @@ WAYS: dict[str, tuple[str, tuple[str, ...]]] = {
     "channels-step": ("step", ("--kind", "channels")),
 }
 _USUAL_WAYS = ("plain-step", "plain-stl", "triangles-stl", "skin-step", "skin-stl")
-# Of the estimate: points along the longest side of the part, and the mesh in parts of that and in radians.
-_POINTS, _DEVIATION, _ANGLE = 160, 2e-4, 0.1
+# Of the estimate: points in the part, and the mesh of it in parts of its longest side and in radians.
+_POINTS, _DEVIATION, _ANGLE = 1_500_000, 2e-4, 0.1
 _CHECK_SECONDS = 300
 
 
@@ -195,24 +196,16 @@ def _look(file: str) -> dict[str, float | str]:
 
 def _solids_of_triangles(mesh: Any) -> int:
     """Connected pieces that hold something: voids are pieces turned inside out."""
-    corners = mesh.triangles
-    shares = np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6
-    adjacency = mesh.face_adjacency
-    count = len(corners)
+    adjacency, count = mesh.face_adjacency, len(mesh.triangles)
     graph = coo_array((np.ones(len(adjacency)), adjacency.T), shape=(count, count))
     pieces, piece = connected_components(graph, directed=False)
-    return int(np.sum(np.bincount(piece, shares, pieces) > 0))
+    return int(np.sum(np.bincount(piece, _volumes(mesh.triangles), pieces) > 0))
 
 
 def _expected(part: str, cell: float, skin: float, kind: str) -> dict[str, float]:
     """Volume of what fills a part, in mm3, by columns of points that lie askew to most faces."""
-    import cadquery as cq
-
-    shape = read_step(part)
-    longest = float(np.ptp(bounding_box(shape), axis=0).max())
-    vertices, triangles = cq.Shape.cast(shape).tessellate(_DEVIATION * longest, _ANGLE)
-    corners = np.array([vertex.toTuple() for vertex in vertices])[np.array(triangles)]
-    step = longest / _POINTS
+    corners = _tessellated(read_step(part))
+    step = float((_volumes(corners).sum() / _POINTS) ** (1 / 3))
     askew = Rotation.random(rng=0)
     turned = askew.apply(corners.reshape(-1, 3)).reshape(corners.shape)
     points = askew.inv().apply(_points_inside(turned, turned.min(axis=(0, 1)), turned.max(axis=(0, 1)), step))
@@ -228,6 +221,24 @@ def _expected(part: str, cell: float, skin: float, kind: str) -> dict[str, float
         near = in_skin.away(points) < skin
         held = held & ~near if kind == "channels" else held | near
     return {"volume": float(held.sum()) * step**3}
+
+
+def _tessellated(shape: TopoDS_Shape) -> Floats:
+    """Triangles of what is in any of a shape's solids, shape (n, 3, 3)."""
+    import cadquery as cq
+    import trimesh
+
+    longest = float(np.ptp(bounding_box(shape), axis=0).max())
+    meshes = []
+    for solid in cq.Shape.cast(shape).Solids():
+        vertices, triangles = solid.tessellate(_DEVIATION * longest, _ANGLE)
+        meshes.append(trimesh.Trimesh([vertex.toTuple() for vertex in vertices], triangles))
+    return np.array((meshes[0] if len(meshes) == 1 else trimesh.boolean.union(meshes)).triangles)
+
+
+def _volumes(corners: Floats) -> Floats:
+    """Of the tetrahedra between triangles and the origin."""
+    return np.asarray(np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6)
 
 
 def _points_inside(corners: Floats, low: Floats, high: Floats, step: float) -> Floats:

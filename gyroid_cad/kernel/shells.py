@@ -117,8 +117,7 @@ def _solids(shells: Sequence[TopoDS_Shell], volume_of: VolumeOf | None) -> list[
         solid = TopoDS_Solid()
         builder.MakeSolid(solid)
         builder.Add(solid, shell)
-        # A shell that is alone bounds no void.
-        if len(shells) > 1 and (volume_of(shell) < 0 if volume_of else _holds_infinity(solid)):
+        if volume_of(shell) < 0 if volume_of else _holds_infinity(solid):
             voids.append(shell)
         else:
             outer.append(solid)

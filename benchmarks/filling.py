@@ -139,9 +139,10 @@ def _against_offset(cells: int, side: float, repeats: int) -> list[Row]:
         repeats, lambda: fill(box, CELL_SIZE, THICKNESS), lambda: BRepAlgoAPI_Common(lattice, box).Shape()
     )
     exact = TUBE.density(THICKNESS / CELL_SIZE) * (side * CELL_SIZE) ** 3
+    held = made.report.volume + made.report.dropped_volume
     return [
         Row(f"{side:g} periods a side: simple offset, cut / ours", theirs / ours, 5, unit="x", at_least=True),
-        Row("  ours: volume off the tube formula", abs(made.report.volume / exact - 1), 1e-4),
+        Row("  ours: volume off the tube formula", abs(held / exact - 1), 1e-4, remark="with dropped chips"),
         Row("  theirs: volume off the tube formula", abs(kernel_volume(common) / exact - 1), remark=_state(common)),
     ]
 

@@ -17,13 +17,19 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
+from OCP.TopoDS import TopoDS_Shape
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial.transform import Rotation
 
 from benchmarks.timing import ROOT, arguments_for, fresh_python, plain_table
 from gyroid_cad.kernel.check import is_valid, measure, topology
@@ -52,8 +58,8 @@ WAYS: dict[str, tuple[str, tuple[str, ...]]] = {
     "channels-step": ("step", ("--kind", "channels")),
 }
 _USUAL_WAYS = ("plain-step", "plain-stl", "triangles-stl", "skin-step", "skin-stl")
-# Of the estimate: points along the longest side of the part, and the mesh in parts of that and in radians.
-_POINTS, _DEVIATION, _ANGLE = 160, 2e-4, 0.1
+# Of the estimate: points in the part, and the mesh of it in parts of its longest side and in radians.
+_POINTS, _DEVIATION, _ANGLE = 1_500_000, 2e-4, 0.1
 _CHECK_SECONDS = 300
 
 
@@ -137,10 +143,10 @@ def _filled(part: Path, way: str, scratch: Path, timeout: float, cells: float) -
 
 
 def _checked(made: Outcome, part: Path, file: Path, cell: float, skin: float, report: dict[str, float]) -> Outcome:
-    """Read a file back and estimate what it should hold, in a process of its own: the kernel may not come back."""
-    asked = json.dumps([str(part), str(file), cell, skin if report["skin"] else 0.0, report["kind"]])
+    """Read a file back and estimate what it should hold, in processes of their own: the kernel may not come back."""
     try:
-        told = json.loads(fresh_python("-m", "benchmarks.real_parts", "--alone", asked))
+        told = _alone("look", str(file))
+        expected = _alone("expected", str(part), cell, skin if report["skin"] else 0.0, report["kind"])["volume"]
     except RuntimeError as problem:
         return replace(made, state="cannot be read back", remark=str(problem).strip().splitlines()[-1])
     volume = told["volume"] + report["dropped_volume"]
@@ -150,49 +156,59 @@ def _checked(made: Outcome, part: Path, file: Path, cell: float, skin: float, re
         state=", ".join(faults) or "ok",
         solids=told["solids"],
         volume=volume,
-        off=100 * (volume / told["expected"] - 1),
+        off=100 * (volume / expected - 1),
         remark=f"{report['islands']} islands" if report["islands"] else "",
     )
 
 
-def _look(part: str, file: str, cell: float, skin: float, kind: str) -> dict[str, float | str]:
-    """Solids and volume of a file, what is wrong with it, and the volume that is expected."""
+@cache
+def _alone(what: str, *about: str | float) -> dict[str, Any]:
+    """The answer of a process of its own; an estimate is asked once for all ways that share it."""
+    asked = json.dumps([what, *about])
+    told: dict[str, Any] = json.loads(fresh_python("-m", "benchmarks.real_parts", "--alone", asked))
+    return told
+
+
+def _look(file: str) -> dict[str, float | str]:
+    """Solids and volume of a file, and what is wrong with it."""
     if file.endswith(".stl"):
         import trimesh
 
         mesh = trimesh.load(file)
-        found = {
-            "solids": int(mesh.body_count),
+        return {
+            "solids": _solids_of_triangles(mesh),
             "volume": float(mesh.volume),
             "fault": "" if mesh.is_watertight and mesh.is_winding_consistent else "not watertight",
         }
-    else:
-        shape, written = read_step(file), topology_in_step(file)
-        read = topology(shape)
-        faults = {
-            "invalid": is_valid(shape),
-            "open": read.closed and written.closed,
-            "faces lost": (read.solids, read.faces) == (written.solids, written.faces),
-        }
-        found = {
-            "solids": read.solids,
-            "volume": measure(shape)[0],
-            "fault": ", ".join(fault for fault, passed in faults.items() if not passed),
-        }
-    return {**found, "expected": _expected(part, cell, skin, kind)}
+    shape, written = read_step(file), topology_in_step(file)
+    read = topology(shape)
+    faults = {
+        "invalid": is_valid(shape),
+        "open": read.closed and written.closed,
+        "faces lost": (read.solids, read.faces) == (written.solids, written.faces),
+    }
+    return {
+        "solids": read.solids,
+        "volume": measure(shape)[0],
+        "fault": ", ".join(fault for fault, passed in faults.items() if not passed),
+    }
 
 
-def _expected(part: str, cell: float, skin: float, kind: str) -> float:
-    """Volume of what fills a part, in mm3, by columns of points."""
-    import cadquery as cq
+def _solids_of_triangles(mesh: Any) -> int:
+    """Connected pieces that hold something: voids are pieces turned inside out."""
+    adjacency, count = mesh.face_adjacency, len(mesh.triangles)
+    graph = coo_array((np.ones(len(adjacency)), adjacency.T), shape=(count, count))
+    pieces, piece = connected_components(graph, directed=False)
+    return int(np.sum(np.bincount(piece, _volumes(mesh.triangles), pieces) > 0))
 
-    shape = read_step(part)
-    low, high = bounding_box(shape)
-    longest = float((high - low).max())
-    vertices, triangles = cq.Shape.cast(shape).tessellate(_DEVIATION * longest, _ANGLE)
-    corners = np.array([vertex.toTuple() for vertex in vertices])[np.array(triangles)]
-    step = longest / _POINTS
-    points = _points_inside(corners, low, high, step)
+
+def _expected(part: str, cell: float, skin: float, kind: str) -> dict[str, float]:
+    """Volume of what fills a part, in mm3, by columns of points that lie askew to most faces."""
+    corners = _tessellated(read_step(part))
+    step = float((_volumes(corners).sum() / _POINTS) ** (1 / 3))
+    askew = Rotation.random(rng=0)
+    turned = askew.apply(corners.reshape(-1, 3)).reshape(corners.shape)
+    points = askew.inv().apply(_points_inside(turned, turned.min(axis=(0, 1)), turned.max(axis=(0, 1)), step))
     offsets = np.concatenate([periodic_offsets(AT_HOME, cell, some) for some in np.array_split(points, 32)])
     tube = USUAL.tube
     half = float(tube.thickness(DENSITY)) * cell / 2
@@ -204,7 +220,25 @@ def _expected(part: str, cell: float, skin: float, kind: str) -> float:
         in_skin = SignedDistances(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3))
         near = in_skin.away(points) < skin
         held = held & ~near if kind == "channels" else held | near
-    return float(held.sum()) * step**3
+    return {"volume": float(held.sum()) * step**3}
+
+
+def _tessellated(shape: TopoDS_Shape) -> Floats:
+    """Triangles of what is in any of a shape's solids, shape (n, 3, 3)."""
+    import cadquery as cq
+    import trimesh
+
+    longest = float(np.ptp(bounding_box(shape), axis=0).max())
+    meshes = []
+    for solid in cq.Shape.cast(shape).Solids():
+        vertices, triangles = solid.tessellate(_DEVIATION * longest, _ANGLE)
+        meshes.append(trimesh.Trimesh([vertex.toTuple() for vertex in vertices], triangles))
+    return np.array((meshes[0] if len(meshes) == 1 else trimesh.boolean.union(meshes)).triangles)
+
+
+def _volumes(corners: Floats) -> Floats:
+    """Of the tetrahedra between triangles and the origin."""
+    return np.asarray(np.sum(corners[:, 0] * np.cross(corners[:, 1], corners[:, 2]), axis=1) / 6)
 
 
 def _points_inside(corners: Floats, low: Floats, high: Floats, step: float) -> Floats:
@@ -272,6 +306,7 @@ def _print(outcomes: Sequence[Outcome]) -> bool:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--alone"]:
-        print(json.dumps(_look(*json.loads(sys.argv[2]))))
+        asked, *about = json.loads(sys.argv[2])
+        print(json.dumps({"look": _look, "expected": _expected}[asked](*about)))
     else:
         sys.exit(not main(sys.argv[1:]))

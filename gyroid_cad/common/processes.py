@@ -14,12 +14,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from io import StringIO
+from multiprocessing.connection import Connection
 from multiprocessing.context import ForkProcess
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 from gyroid_cad.errors import KernelError
 
-__all__ = ["Started", "can_fork", "processors", "results_of", "started"]
+__all__ = ["Started", "beside", "can_fork", "processors", "results_of", "started"]
 
 T = TypeVar("T")
 
@@ -104,6 +105,69 @@ def results_of(
         results.append(work(number))
         done(number)
     return results
+
+
+@contextmanager
+def beside(work: Callable[[], T], aim: str) -> Iterator[Callable[[], T]]:
+    """Let a forked process do some work while this one goes on, where there is a second processor for it.
+
+    Parameters
+    ----------
+    work : callable
+    aim : str
+        As of :func:`results_of`.
+
+    Yields
+    ------
+    callable
+        That waits for the result of the work, or does it now.
+
+    Raises
+    ------
+    KernelError
+        From that callable, if the process ended before its work.
+
+    Examples
+    --------
+    >>> with beside(lambda: sum(range(10)), "adds numbers") as total:
+    ...     print(total())
+    45
+    """
+    if processors() < 2 or not can_fork():
+        yield work
+        return
+    mine, theirs = multiprocessing.Pipe(duplex=False)
+    process = ForkProcess(target=_work_for, args=(os.getpid(), work, theirs), daemon=True)
+    try:
+        with interrupts_later():
+            process.start()
+    except OSError:
+        yield work
+        return
+    theirs.close()
+
+    def result() -> T:
+        try:
+            succeeded, found = mine.recv()
+        except EOFError:
+            raise KernelError(f"a process that {aim} ended too soon") from None
+        if not succeeded:
+            raise found
+        return cast("T", found)
+
+    try:
+        yield result
+    finally:
+        process.kill()
+        process.join()
+
+
+def _work_for(parent: int, work: Callable[[], object], answer: Connection) -> None:
+    settle_in(parent)
+    try:
+        answer.send((True, work()))
+    except Exception as problem:
+        answer.send((False, problem))
 
 
 def _results_in_processes(

@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.extent import PartExtent
@@ -19,16 +20,17 @@ from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
 from gyroid_cad.kernel.check import measure
-from gyroid_cad.kernel.crossed import crossed_pieces, sizes_of
+from gyroid_cad.kernel.crossed import FaceSizes, crossed_pieces
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.regions import split_by_region
+from gyroid_cad.kernel.shells import VolumeOf, connected_shells
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import Pieces, bounded_solids, connected_shells
+from gyroid_cad.kernel.split import Pieces, bounded_solids
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.crossing import cross_part
-from gyroid_cad.trim.measures import boundary_measures, joined, lattice_measures, whole_measures
+from gyroid_cad.trim.measures import PieceMeasures, boundary_measures, joined, lattice_measures, whole_measures
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
 __all__ = ["Job", "Made", "Road", "taken"]
@@ -165,21 +167,24 @@ def _crossed(
             progress=lambda done, count: report_progress(job.progress, "cut", done, count),
         )
     whole = [(patch, side, backwards) for patch in inside.tolist() for side, backwards in region.sides]
-    with job.timed("solid"):
-        pieces, faces = crossed_pieces(cut, read, whole)
-        shapes = _joined(job, infill, region, pieces, faces)
-    with job.timed("measure"):
-        middle = (job.part.low + job.part.high) / 2
-        measures = joined(
+    middle = (job.part.low + job.part.high) / 2
+
+    def measured() -> PieceMeasures:
+        return joined(
             lattice_measures(cut, middle),
             boundary_measures(cut, [*cut.inner, *cut.outer], middle),
             whole_measures(infill.wall, whole, middle),
         )
-        sizes = sizes_of(shapes, [*pieces.inside, *pieces.boundary, *faces], measures, middle)
-    return [
-        Made(shape, 0.0 if region.surface else volume, area)
-        for shape, (volume, area) in zip(shapes, sizes, strict=True)
-    ]
+
+    with beside(measured, "measures the faces") as measures:
+        with job.timed("solid"):
+            pieces, faces = crossed_pieces(cut, read, whole)
+        with job.timed("measure"):
+            sizes = FaceSizes([*pieces.inside, *pieces.boundary, *faces], measures(), middle)
+    with job.timed("join"):
+        shapes = _joined(job, infill, region, pieces, faces, lambda shell: sizes.of(shell)[0])
+        made = [(shape, *sizes.of(shape)) for shape in shapes]
+    return [Made(shape, 0.0 if region.surface else volume, area) for shape, volume, area in made]
 
 
 def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:
@@ -208,7 +213,9 @@ def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Foun
     return made, int(np.sum(sides == CROSSING)), int(np.sum(sides == INSIDE))
 
 
-def _joined(job: Job, infill: Infill, region: Region, pieces: Pieces, whole: list[Any]) -> list[KernelShape]:
+def _joined(
+    job: Job, infill: Infill, region: Region, pieces: Pieces, whole: list[Any], volume_of: VolumeOf | None = None
+) -> list[KernelShape]:
     """Solids, or shells, that pieces of the lattice and of the part bound."""
 
     def wanted_at(point: Floats) -> bool:
@@ -217,5 +224,5 @@ def _joined(job: Job, infill: Infill, region: Region, pieces: Pieces, whole: lis
     if region.surface:
         return list(connected_shells([*pieces.inside, *whole]))
     if job.hollow is None or region.fluid:
-        return list(bounded_solids(pieces, whole, wanted_at))
-    return list(job.hollow.solids(pieces, whole, wanted_at))
+        return list(bounded_solids(pieces, whole, wanted_at, volume_of))
+    return list(job.hollow.solids(pieces, whole, wanted_at, volume_of))

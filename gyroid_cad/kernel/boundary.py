@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
@@ -30,7 +31,6 @@ from OCP.gp import gp_Ax3, gp_Pnt, gp_Pnt2d, gp_Vec, gp_Vec2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
-from scipy.interpolate import BSpline, NdBSpline
 
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import KernelError
@@ -231,7 +231,7 @@ def _of_spline(spline: Geom_BSplineSurface) -> Derivatives | None:
     # By scipy, which looks at the few functions alone that do not vanish: lofts have a hundred along each parameter.
     weights = surface.weights[..., np.newaxis]
     rational = np.ptp(weights) > 0
-    together = NdBSpline(
+    together = scipy.interpolate.NdBSpline(
         knots, np.concatenate([surface.control_points * weights, weights[..., : int(rational)]], -1), degrees
     )
 
@@ -345,8 +345,8 @@ def _spline(spline: Any, poles: Floats, order: int) -> Curve:
     weights = np.array([spline.Weight(k) for k in range(1, len(poles) + 1)])
 
     above, below = (
-        BSpline(knots, poles * weights[:, np.newaxis], degree),
-        BSpline(knots, weights[:, np.newaxis], degree),
+        scipy.interpolate.BSpline(knots, poles * weights[:, np.newaxis], degree),
+        scipy.interpolate.BSpline(knots, weights[:, np.newaxis], degree),
     )
     derivatives = orders(order, 1)
 

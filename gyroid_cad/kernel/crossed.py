@@ -26,7 +26,7 @@ from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.sections import section_knots
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["crossed_pieces", "sizes_of"]
+__all__ = ["FaceSizes", "crossed_pieces"]
 
 Floats = NDArray[np.float64]
 
@@ -250,14 +250,11 @@ def _plane_section(control: Floats) -> Geom2d_BSplineCurve:
     return plane_curve(control, section_knots(len(control)))
 
 
-def sizes_of(
-    solids: Iterable[TopoDS_Shape], faces: Iterable[TopoDS_Face], measures: PieceMeasures, middle: Floats
-) -> list[tuple[float, float]]:
-    """Volumes in mm3 and areas in mm2 of solids, from those of their faces; the kernel is asked for faces not given.
+class FaceSizes:
+    """Volumes and areas of what faces bound, from those of the faces; the kernel is asked for faces not given.
 
     Parameters
     ----------
-    solids : iterable of TopoDS_Shape
     faces : iterable of TopoDS_Face
         Oriented as they are measured.
     measures : PieceMeasures
@@ -265,20 +262,23 @@ def sizes_of(
     middle : ndarray, shape (3,)
         That the fluxes are taken about.
     """
-    numbers, orientations = NumberedShapes(), []
-    for face in faces:
-        numbers.Add(face)
-        orientations.append(face.Orientation())
-    sizes = []
-    for solid in solids:
+
+    def __init__(self, faces: Iterable[TopoDS_Face], measures: PieceMeasures, middle: Floats) -> None:
+        self._numbers, self._orientations = NumberedShapes(), []
+        for face in faces:
+            self._numbers.Add(face)
+            self._orientations.append(face.Orientation())
+        self._measures, self._middle = measures, middle
+
+    def of(self, shape: TopoDS_Shape) -> tuple[float, float]:
+        """Volume in mm3, negative if the shape is inside out, and area in mm2."""
         volume = area = 0.0
-        for face in parts_of(solid, TopAbs_FACE):
-            index = int(numbers.FindIndex(face)) - 1
+        for face in parts_of(shape, TopAbs_FACE):
+            index = int(self._numbers.FindIndex(face)) - 1
             if index >= 0:
-                sign = 1.0 if face.Orientation() == orientations[index] else -1.0
-                flux, size = sign * float(measures.flux[index]), float(measures.area[index])
+                sign = 1.0 if face.Orientation() == self._orientations[index] else -1.0
+                flux, size = sign * float(self._measures.flux[index]), float(self._measures.area[index])
             else:
-                flux, size = measure_about(as_face(face), middle)
+                flux, size = measure_about(as_face(face), self._middle)
             volume, area = volume + flux, area + size
-        sizes.append((volume, area))
-    return sizes
+        return volume, area

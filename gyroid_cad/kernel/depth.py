@@ -21,7 +21,7 @@ from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, to
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import triangles_of
-from gyroid_cad.kernel.split import inner_point
+from gyroid_cad.kernel.shells import inner_point
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
 from gyroid_cad.mesh.triangles.measures import unmatched_edges

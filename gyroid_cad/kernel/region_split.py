@@ -37,7 +37,8 @@ from gyroid_cad.kernel.check import compound_of, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part
-from gyroid_cad.kernel.split import general_fuse, lies_in, modified
+from gyroid_cad.kernel.shells import lies_in
+from gyroid_cad.kernel.split import general_fuse, modified
 
 __all__ = ["NEW", "Edge", "Found", "RegionPiece", "RegionSplit", "Task", "Values", "all_of", "map_of", "place_of"]
 

@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepTools import BRepTools_ReShape
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_Orientation
-from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Solid, TopoDS_Wire
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopoDS import TopoDS_Face, TopoDS_Solid, TopoDS_Wire
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of, parts_of
-from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
+from gyroid_cad.kernel.compat import as_edge, as_face
 from gyroid_cad.kernel.depth import Inside, NearDistances, points_on
 from gyroid_cad.kernel.offset_pieces import offset_pieces
 from gyroid_cad.kernel.offset_surface import curve_points
-from gyroid_cad.kernel.split import Change, changes, general_fuse, modified, solids_of
+from gyroid_cad.kernel.shells import solids_of, users_of
+from gyroid_cad.kernel.split import Change, changes, general_fuse, modified
 
 __all__ = ["OpenSkinError", "core_of_pieces", "with_changes"]
 
@@ -92,7 +93,7 @@ def _core_of_pieces(solid: TopoDS_Solid, places: _Places, openings: Sequence[Top
             pieces.append(piece)
             deep.append(bool(enough.all()))
     # A piece without a neighbour may have one that was not made beside it, but only comes to it.
-    lone = {users[0][0] for users in _users(pieces).values() if len(users) == 1}
+    lone = {uses[0].face for uses in users_of(pieces) if len(uses) == 1}
     whole = [piece for index, piece in enumerate(pieces) if deep[index] and index not in lone]
     crossing = [piece for index, piece in enumerate(pieces) if not deep[index] or index in lone]
     for fuzzy in _FUZZY[:-1]:
@@ -160,24 +161,11 @@ def _border(face: TopoDS_Face) -> Floats:
     )
 
 
-def _users(faces: Sequence[TopoDS_Face]) -> dict[TopoDS_Edge, list[tuple[int, TopAbs_Orientation]]]:
-    """For every edge that is none shrunk to a point, the faces that it bounds, by index, and which way it runs."""
-    edges = NumberedShapes()
-    users: list[list[tuple[int, TopAbs_Orientation]]] = []
-    for index, face in enumerate(faces):
-        for edge in parts_of(face, TopAbs_EDGE):
-            if not BRep_Tool.Degenerated_s(as_edge(edge)):
-                number = edges.Add(edge)
-                users += [[] for _ in range(number - len(users))]
-                users[number - 1].append((index, edge.Orientation()))
-    return {as_edge(edges.FindKey(number)): some for number, some in enumerate(users, 1)}
-
-
 def _require_closed(faces: Sequence[TopoDS_Face]) -> None:
     """Raise if an edge does not bound two faces, once in either direction."""
-    for edge, users in _users(faces).items():
-        if len(users) != 2 or users[0][1] == users[1][1]:
-            curve = BRepAdaptor_Curve(edge)
+    for uses in users_of(faces):
+        if len(uses) != 2 or uses[0].orientation == uses[1].orientation:
+            curve = BRepAdaptor_Curve(uses[0].edge)
             middle = (curve.FirstParameter() + curve.LastParameter()) / 2
             raise OpenSkinError(curve_points(curve, np.array([middle]))[0])
 

@@ -27,8 +27,9 @@ from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, measure, require_part, selected_faces
+from gyroid_cad.kernel.shells import VolumeOf, solids_of
 from gyroid_cad.kernel.sieve import with_changes
-from gyroid_cad.kernel.split import Pieces, changes, general_fuse, inner_sides, modified, solids_of
+from gyroid_cad.kernel.split import Pieces, changes, general_fuse, inner_sides, modified
 
 __all__ = ["Hollow", "hollow", "hollow_round", "opened_faces", "openings_of"]
 
@@ -65,7 +66,11 @@ class Hollow:
     thickness: float | None
 
     def solids(
-        self, pieces: Pieces, whole: Iterable[TopoDS_Shape], wanted_at: Callable[[Floats], bool]
+        self,
+        pieces: Pieces,
+        whole: Iterable[TopoDS_Shape],
+        wanted_at: Callable[[Floats], bool],
+        volume_of: VolumeOf | None = None,
     ) -> list[TopoDS_Solid]:
         """The skin, and with it what faces of a lattice bound in the core.
 
@@ -78,6 +83,8 @@ class Hollow:
         wanted_at : callable
             Whether a point, shape (3,), on the core's boundary belongs to the solid wanted: asked only of pieces of the
             boundary that are connected with none that the lattice meets.
+        volume_of : callable, optional
+            As of :func:`~gyroid_cad.kernel.shells.solids_of`.
 
         Raises
         ------
@@ -91,7 +98,7 @@ class Hollow:
             if inner == self.opened[origin]
         ]
         skin = with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
-        return solids_of([*skin, *pieces.inside, *map(as_face, whole), *ends])
+        return solids_of([*skin, *pieces.inside, *map(as_face, whole), *ends], volume_of)
 
 
 def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Hollow:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_BSplineCurve
 from OCP.gp import gp_Pnt2d
-from scipy.interpolate import BSpline, make_interp_spline
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.compat import Point2dArray
@@ -68,7 +68,7 @@ def _curve(points_at: Callable[[Floats], Floats], breaks: Sequence[float], toler
         ends = _divided(np.asarray(breaks, dtype=float), count)
         knots = _knots(ends, breaks)
         places = _places(knots)
-        spline = make_interp_spline(places, points_at(places), k=_DEGREE, t=knots)
+        spline = scipy.interpolate.make_interp_spline(places, points_at(places), k=_DEGREE, t=knots)
         between = np.concatenate([ends[:-1] + part * np.diff(ends) for part in _BETWEEN])
         if np.abs(spline(between) - points_at(between)).max() < tolerance:
             return spline.t, spline.c
@@ -104,8 +104,8 @@ def fitted_surface(
         ends = [_divided(np.unique(breaks), count) for breaks, count in zip((breaks_u, breaks_v), counts, strict=True)]
         knots = [_knots(some, breaks) for some, breaks in zip(ends, (breaks_u, breaks_v), strict=True)]
         u, v = map(_places, knots)
-        along = make_interp_spline(u, points_at(u, v), k=_DEGREE, t=knots[0])
-        poles = make_interp_spline(v, along.c.swapaxes(0, 1), k=_DEGREE, t=knots[1]).c.swapaxes(0, 1)
+        along = scipy.interpolate.make_interp_spline(u, points_at(u, v), k=_DEGREE, t=knots[0])
+        poles = scipy.interpolate.make_interp_spline(v, along.c.swapaxes(0, 1), k=_DEGREE, t=knots[1]).c.swapaxes(0, 1)
         off = [
             np.abs(_evaluated(poles, knots, *places) - points_at(*places)).max()
             for places in ((_between(ends[0]), _some(v)), (_some(u), _between(ends[1])))
@@ -121,8 +121,8 @@ def fitted_surface(
 
 
 def _evaluated(poles: Floats, knots: Sequence[Floats], u: Floats, v: Floats) -> Floats:
-    along = BSpline(knots[0], poles, _DEGREE)(u).swapaxes(0, 1)
-    return np.asarray(BSpline(knots[1], along, _DEGREE)(v).swapaxes(0, 1))
+    along = scipy.interpolate.BSpline(knots[0], poles, _DEGREE)(u).swapaxes(0, 1)
+    return np.asarray(scipy.interpolate.BSpline(knots[1], along, _DEGREE)(v).swapaxes(0, 1))
 
 
 def _some(places: Floats) -> Floats:

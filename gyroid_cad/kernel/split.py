@@ -14,49 +14,36 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BOPAlgo import BOPAlgo_Builder
-from OCP.BOPTools import BOPTools_AlgoTools, BOPTools_AlgoTools3D
-from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BOPTools import BOPTools_AlgoTools
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
-from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_Context
 from OCP.TopAbs import (
     TopAbs_EDGE,
     TopAbs_FACE,
     TopAbs_FORWARD,
-    TopAbs_IN,
-    TopAbs_Orientation,
-    TopAbs_REVERSED,
     TopAbs_VERTEX,
 )
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, ShapeList, as_edge, as_face
-from gyroid_cad.kernel.extent import box_round
 from gyroid_cad.kernel.part import Part
+from gyroid_cad.kernel.shells import VolumeOf, inner_point, lies_in, solids_of, users_of
 
 __all__ = [
     "Pieces",
     "bounded_solids",
     "changes",
-    "connected_shells",
     "general_fuse",
-    "inner_point",
     "inner_sides",
-    "lies_in",
     "modified",
     "running_like",
-    "solids_of",
     "split",
 ]
 
 Floats = NDArray[np.float64]
 Change = tuple[TopoDS_Shape, tuple[TopoDS_Shape, ...]]
-
-_CLASSIFYING_TOLERANCE = 1e-7
-_BOTH_WAYS = {TopAbs_FORWARD, TopAbs_REVERSED}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +105,10 @@ def split(part: Part, faces: Sequence[TopoDS_Shape]) -> Pieces:
 
 
 def bounded_solids(
-    pieces: Pieces, whole: Iterable[TopoDS_Shape], wanted_at: Callable[[Floats], bool]
+    pieces: Pieces,
+    whole: Iterable[TopoDS_Shape],
+    wanted_at: Callable[[Floats], bool],
+    volume_of: VolumeOf | None = None,
 ) -> list[TopoDS_Solid]:
     """The solids bounded by faces of the lattice and by those pieces of the part's boundary on their inner side.
 
@@ -131,6 +121,8 @@ def bounded_solids(
     wanted_at : callable
         Whether a point, shape (3,), on the part's boundary belongs to the solid wanted: asked only of pieces of the
         boundary that are connected with none that the lattice meets.
+    volume_of : callable, optional
+        As of :func:`~gyroid_cad.kernel.shells.solids_of`.
 
     Returns
     -------
@@ -142,41 +134,8 @@ def bounded_solids(
         If the faces do not close, or do not agree on what is inside.
     """
     boundary = zip(pieces.boundary, inner_sides(pieces, wanted_at), strict=True)
-    return solids_of([*pieces.inside, *map(as_face, whole), *(piece for piece, inner in boundary if inner)])
-
-
-def solids_of(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Solid]:
-    """The solids that faces bound which share their edges, outer shells with the voids in them.
-
-    Parameters
-    ----------
-    faces : sequence of TopoDS_Face
-        Oriented out of the solids.
-
-    Raises
-    ------
-    KernelError
-        If an edge is not shared by exactly two of the faces, which run through it in opposite ways.
-    """
-    users = _users(faces)
-    if any({use.orientation for use in uses} != _BOTH_WAYS or len(uses) != 2 for uses in users):
-        raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
-    shells = [_shell([faces[index] for index in group]) for group in _grouped(len(faces), users)]
-    return _solids(shells)
-
-
-def connected_shells(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:
-    """Faces in shells that are connected by edges, closed or not.
-
-    Parameters
-    ----------
-    faces : sequence of TopoDS_Face
-        Oriented alike.
-    """
-    users = _users(faces)
-    groups = _grouped(len(faces), users)
-    opened = {use.face for uses in users for use in uses if len(uses) != 2}
-    return [_shell([faces[index] for index in group], opened.isdisjoint(group)) for group in groups]
+    inner = (piece for piece, inner in boundary if inner)
+    return solids_of([*pieces.inside, *map(as_face, whole), *inner], volume_of)
 
 
 def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[bool]:
@@ -204,7 +163,7 @@ def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[boo
     count = len(pieces.inside)
     wanted: dict[int, bool] = {}
     beside: dict[int, set[int]] = {}
-    for uses in _users([*pieces.inside, *pieces.boundary]):
+    for uses in users_of([*pieces.inside, *pieces.boundary]):
         cuts = [use for use in uses if use.face < count]
         borders = [use for use in uses if use.face >= count]
         if len(cuts) == 1:
@@ -222,14 +181,6 @@ def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[boo
     return [wanted[index] for index in range(count, count + len(pieces.boundary))]
 
 
-@dataclass(frozen=True, slots=True)
-class _Use:
-    """A face, by its index, that an edge bounds, and how."""
-
-    face: int
-    orientation: TopAbs_Orientation
-
-
 def _spread(wanted: dict[int, bool], reached: list[int], beside: dict[int, set[int]]) -> None:
     """Carry what was decided of some faces on to those beside them."""
     while reached:
@@ -243,71 +194,6 @@ def _spread(wanted: dict[int, bool], reached: list[int], beside: dict[int, set[i
 def _decide(wanted: dict[int, bool], face: int, inner: bool) -> None:
     if wanted.setdefault(face, inner) != inner:
         raise KernelError("the pieces of the lattice do not agree on which pieces of the part lie inside")
-
-
-def _users(faces: Sequence[TopoDS_Face]) -> list[list[_Use]]:
-    """For every edge, the faces it bounds."""
-    edges = NumberedShapes()
-    users: list[list[_Use]] = []
-    for index, face in enumerate(faces):
-        for edge in parts_of(face, TopAbs_EDGE):
-            # At the pole of a sphere: no other face is to be found there.
-            if BRep_Tool.Degenerated_s(as_edge(edge)):
-                continue
-            number = edges.Add(edge)
-            if number > len(users):
-                users.append([])
-            users[number - 1].append(_Use(index, edge.Orientation()))
-    return users
-
-
-def _grouped(count: int, users: list[list[_Use]]) -> list[list[int]]:
-    """Faces in groups that are connected by edges."""
-    pairs = np.array([(uses[0].face, use.face) for uses in users for use in uses], dtype=np.int64).reshape(-1, 2)
-    groups: dict[int, list[int]] = {}
-    for face, label in enumerate(connected(count, *pairs.T).tolist()):
-        groups.setdefault(label, []).append(face)
-    return list(groups.values())
-
-
-def _shell(faces: Iterable[TopoDS_Face], closed: bool = True) -> TopoDS_Shell:
-    builder, shell = BRep_Builder(), TopoDS_Shell()
-    builder.MakeShell(shell)
-    for face in faces:
-        builder.Add(shell, face)
-    shell.Closed(closed)
-    return shell
-
-
-def _solids(shells: Sequence[TopoDS_Shell]) -> list[TopoDS_Solid]:
-    """Outer shells as solids, with the voids that lie in them."""
-    builder, context = BRep_Builder(), IntTools_Context()
-    outer: list[tuple[TopoDS_Solid, BRepClass3d_SolidClassifier]] = []
-    voids: list[TopoDS_Shell] = []
-    for shell in shells:
-        solid = TopoDS_Solid()
-        builder.MakeSolid(solid)
-        builder.Add(solid, shell)
-        classifier = BRepClass3d_SolidClassifier(solid)
-        classifier.PerformInfinitePoint(_CLASSIFYING_TOLERANCE)
-        if classifier.State() == TopAbs_IN:
-            voids.append(shell)
-        else:
-            outer.append((solid, classifier))
-    # Solids before voids are added: of those round a void, which lie in each other's voids, the smallest is its own.
-    round_void = [
-        [solid for solid, classifier in outer if lies_in(next(parts_of(shell, TopAbs_FACE)), classifier, context)]
-        for shell in voids
-    ]
-    for shell, solids in zip(voids, round_void, strict=True):
-        if not solids:
-            raise KernelError("a void of the filled part lies in none of its solids")
-        builder.Add(solids[0] if len(solids) == 1 else min(solids, key=_extent), shell)
-    return [solid for solid, _ in outer]
-
-
-def _extent(shape: TopoDS_Shape) -> float:
-    return float(box_round([shape]).SquareExtent())
 
 
 def general_fuse(
@@ -375,16 +261,3 @@ def running_like(whole: TopoDS_Shape, piece: TopoDS_Shape, context: IntTools_Con
         return forward
     backwards = BOPTools_AlgoTools.IsSplitToReverse_s(as_edge(forward), as_edge(whole), context, 0)
     return forward.Reversed() if backwards else forward
-
-
-def lies_in(face: TopoDS_Shape, classifier: BRepClass3d_SolidClassifier, context: IntTools_Context) -> bool:
-    """Tell whether a face that crosses a solid's boundary nowhere lies in it."""
-    classifier.Perform(inner_point(as_face(face), context), _CLASSIFYING_TOLERANCE)
-    return bool(classifier.State() == TopAbs_IN)
-
-
-def inner_point(face: TopoDS_Face, context: IntTools_Context) -> gp_Pnt:
-    """A point on a face and not on its edges."""
-    place, parameters = gp_Pnt(), gp_Pnt2d()
-    BOPTools_AlgoTools3D.PointInFace_s(face, place, parameters, context)
-    return place

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import sys
@@ -10,7 +11,8 @@ from pathlib import Path
 import errands
 import pytest
 
-from gyroid_cad.common.processes import can_fork, started
+from gyroid_cad.common.processes import beside, can_fork, processors, started
+from gyroid_cad.errors import KernelError, ParameterError
 
 PATIENCE = 60.0
 Captured = pytest.CaptureFixture[str]
@@ -45,3 +47,25 @@ def test_one_that_does_not_end_is_waited_for_as_long_as_one_likes_and_ended() ->
     assert work.wait(0.01) is None
     work.kill()
     assert work.wait(PATIENCE) == -signal.SIGKILL
+
+
+def test_work_beside_runs_in_another_process_and_its_result_and_errors_come_back() -> None:
+    def refuses() -> int:
+        raise ParameterError("cells", 0, "at least 1")
+
+    with beside(os.getpid, "tells its number") as number:
+        assert (number() != os.getpid()) == (can_fork() and processors() > 1)
+    with beside(refuses, "refuses") as result, pytest.raises(ParameterError, match="cells"):
+        result()
+
+
+@pytest.mark.skipif(not can_fork() or processors() < 2, reason="all is done in this process")
+def test_work_beside_that_ends_its_process_is_an_error() -> None:
+    with beside(lambda: os._exit(3), "ends itself") as result, pytest.raises(KernelError, match="ends itself"):
+        result()
+
+
+def test_work_beside_whose_result_nobody_waits_for_is_ended() -> None:
+    with beside(signal.pause, "sleeps"):
+        pass
+    assert not multiprocessing.active_children()

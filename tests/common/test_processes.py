@@ -59,8 +59,9 @@ def test_work_beside_runs_in_another_process_and_its_result_and_errors_come_back
         result()
 
 
-@pytest.mark.skipif(not can_fork() or processors() < 2, reason="all is done in this process")
 def test_work_beside_that_ends_its_process_is_an_error() -> None:
+    if not can_fork() or processors() < 2:
+        pytest.skip("all is done in this process, which it would end")
     with beside(lambda: os._exit(3), "ends itself") as result, pytest.raises(KernelError, match="ends itself"):
         result()
 

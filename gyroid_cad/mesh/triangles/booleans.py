@@ -16,6 +16,7 @@ from manifold3d import Error, Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
+from gyroid_cad.mesh.triangles.storing import joined_meshes
 
 __all__ = ["Body", "body_of", "united"]
 
@@ -96,10 +97,23 @@ class Body:
         solid, voids = self._shells
         if len(solid) == 1:
             return [self]
-        with_voids = {_smallest_round(void, solid) for void in voids}
-        # What the library decomposes are shells: one that goes round voids is intersected with the whole again.
-        found = [Body(self.manifold ^ shell if k in with_voids else shell) for k, shell in enumerate(solid)]
-        return sorted(found, key=lambda piece: -piece.volume)
+        # What the library decomposes are shells. The whole within one would have what lies in its voids as well.
+        shells = [[shell] for shell in solid]
+        for void in voids:
+            shells[_smallest_round(void, solid)].append(void)
+        return sorted(map(_within, shells), key=lambda piece: -piece.volume)
+
+    def without_voids(self, least: float) -> Body:
+        """The body, voids below a volume in mm3 filled.
+
+        >>> cube = Body(Manifold.cube((2, 2, 2)))
+        >>> hollow = cube - Body(Manifold.cube((1, 1, 1))).moved(np.full(3, 0.5))
+        >>> hollow.without_voids(0.5).volume, hollow.without_voids(2.0).volume
+        (7.0, 8.0)
+        """
+        solid, voids = self._shells
+        left = [void for void in voids if -void.volume() >= least]
+        return self if len(left) == len(voids) else _within([*solid, *left])
 
     @property
     def void_count(self) -> int:
@@ -200,6 +214,15 @@ def united(bodies: Iterable[Body]) -> Body:
     23.0
     """
     return Body(Manifold.batch_boolean([body.manifold for body in bodies], OpType.Add))
+
+
+def _within(shells: Sequence[Manifold]) -> Body:
+    """The body that shells bound which do not meet, some of them turned inwards."""
+    if len(shells) == 1:
+        return Body(shells[0])
+    body = body_of(*joined_meshes([Body(shell).triangles() for shell in shells]))
+    assert body is not None
+    return body
 
 
 def _smallest_round(void: Manifold, shells: Sequence[Manifold]) -> int:

@@ -16,7 +16,6 @@ from manifold3d import Error, Manifold, Mesh64, OpType
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
-from gyroid_cad.mesh.triangles.storing import joined_meshes
 
 __all__ = ["Body", "body_of", "united"]
 
@@ -94,26 +93,33 @@ class Body:
         >>> [(round(piece.volume, 9), piece.void_count) for piece in (hollow | cube.moved(np.full(3, 5.0))).pieces()]
         [(8.0, 0), (7.0, 1)]
         """
-        solid, voids = self._shells
-        if len(solid) == 1:
-            return [self]
-        # What the library decomposes are shells. The whole within one would have what lies in its voids as well.
-        shells = [[shell] for shell in solid]
-        for void in voids:
-            shells[_smallest_round(void, solid)].append(void)
-        return sorted(map(_within, shells), key=lambda piece: -piece.volume)
+        return [self] if len(self._shells[0]) == 1 else self._pieces(0.0, 0.0)
 
-    def without_voids(self, least: float) -> Body:
-        """The body, voids below a volume in mm3 filled.
+    def without_films(self, least_solid: float, least_void: float) -> Body:
+        """The body without pieces below a volume in mm3, and with voids below another filled in which nothing lies.
 
         >>> cube = Body(Manifold.cube((2, 2, 2)))
         >>> hollow = cube - Body(Manifold.cube((1, 1, 1))).moved(np.full(3, 0.5))
-        >>> hollow.without_voids(0.5).volume, hollow.without_voids(2.0).volume
+        >>> hollow.without_films(0.1, 0.5).volume, hollow.without_films(0.1, 2.0).volume
         (7.0, 8.0)
         """
         solid, voids = self._shells
-        left = [void for void in voids if -void.volume() >= least]
-        return self if len(left) == len(voids) else _within([*solid, *left])
+        small = any(shell.volume() < least_solid for shell in solid) or any(
+            -void.volume() < least_void for void in voids
+        )
+        return united(self._pieces(least_solid, least_void)) if small else self
+
+    def _pieces(self, least_solid: float, least_void: float) -> list[Body]:
+        """Pieces and voids in them of some volume, the largest piece first."""
+        solid, voids = self._shells
+        solid = [shell for shell in solid if shell.volume() >= least_solid]
+        # What the library decomposes are shells. The whole within one would have what lies in its voids as well.
+        holes: list[list[Body]] = [[] for _ in solid]
+        for void in voids:
+            if -void.volume() >= least_void or any(_lies_in(shell, void) for shell in solid):
+                holes[_smallest_round(void, solid)].append(Body(void).inside_out())
+        found = [Body(shell) - united(some) if some else Body(shell) for shell, some in zip(solid, holes, strict=True)]
+        return sorted(found, key=lambda piece: -piece.volume)
 
     @property
     def void_count(self) -> int:
@@ -216,24 +222,20 @@ def united(bodies: Iterable[Body]) -> Body:
     return Body(Manifold.batch_boolean([body.manifold for body in bodies], OpType.Add))
 
 
-def _within(shells: Sequence[Manifold]) -> Body:
-    """The body that shells bound which do not meet, some of them turned inwards."""
-    if len(shells) == 1:
-        return Body(shells[0])
-    body = body_of(*joined_meshes([Body(shell).triangles() for shell in shells]))
-    assert body is not None
-    return body
+def _lies_in(inner: Manifold, outer: Manifold) -> bool:
+    """Tell whether one's box lies in the other's."""
+    (low, high), (least, most) = (np.array(one.bounding_box()).reshape(2, 3) for one in (inner, outer))
+    return bool(np.all(low >= least) and np.all(high <= most))
 
 
 def _smallest_round(void: Manifold, shells: Sequence[Manifold]) -> int:
     """Number of the smallest shell that goes round a void, by how often a ray from it crosses each."""
     start = np.array(void.to_mesh64().vert_properties[0, :3])
-    low, high = np.array(void.bounding_box()).reshape(2, 3)
     found, least = 0, np.inf
     for index, shell in enumerate(shells):
-        box = np.array(shell.bounding_box()).reshape(2, 3)
-        if np.any(box[0] > low) or np.any(box[1] < high) or shell.volume() >= least:
+        if not _lies_in(void, shell) or shell.volume() >= least:
             continue
+        box = np.array(shell.bounding_box()).reshape(2, 3)
         # A direction that no flat face of a part is likely to lie along.
         beyond = start + np.linalg.norm(box[1] - box[0]) * 1.5 * _ASKEW
         if len(shell.ray_cast(start.tolist(), beyond.tolist())) % 2:

@@ -27,7 +27,6 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-
 # Solid angle of a whole sphere, by which winding numbers are counted.
 _SPHERE = 4 * np.pi
 

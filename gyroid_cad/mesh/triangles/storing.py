@@ -19,7 +19,7 @@ Integers = NDArray[np.int64]
 
 # In mm: programs that read triangles take corners nearer than 1e-8 for one, some of them up to several times that.
 TOLD_APART = 2.0**-24
-# How often corners that became one are moved apart, each time by twice as many steps.
+# How often corners that became one are moved apart, first by two steps and each time by twice as many.
 _TRIES = 8
 
 
@@ -79,7 +79,7 @@ def storable_triangles(vertices: Floats, triangles: Integers, single: bool = Tru
         places, numbers, _ = renumbered(stored, triangles)
         if not unmatched_edges(numbers):
             return places, numbers
-        stored = _in_steps(_parted(vertices, triangles, stored, step * 2.0**attempt), step)
+        stored = _in_steps(_parted(vertices, triangles, stored, step * 2.0 ** (attempt + 1)), step)
     raise ExportError(
         "nothing was written: its triangles do not stay closed in single precision; try another deviation"
     )

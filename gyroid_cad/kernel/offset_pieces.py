@@ -333,17 +333,16 @@ class _Pieces:
 
     def _lay(self, edge: TopoDS_Edge, lines: Sequence[Geom2d_Curve], surface: Geom_Surface) -> None:
         """Have an edge lie on a surface, along one line or as its seam, as near to it as it is."""
-        off = _MARGIN * self.tolerance
+        curve, off = BRepAdaptor_Curve(edge), self.tolerance
         if not BRep_Tool.Degenerated_s(edge):
             # Both are fits: together they may be apart by more than either of them.
-            curve = BRepAdaptor_Curve(edge)
             parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), _CLOSELY)
-            on_curve = curve_points(curve, parameters)
-            away = [derivatives(surface, plane_points(line, parameters))[0] - on_curve for line in lines]
-            off = max(off, _MARGIN * float(np.linalg.norm(away, axis=-1).max()))
-        self.builder.UpdateEdge(edge, *lines, surface, self.place, off)
+            on_lines = [derivatives(surface, plane_points(line, parameters))[0] for line in lines]
+            away = on_lines - curve_points(curve, parameters)
+            off = max(off, float(np.linalg.norm(away, axis=-1).max()))
+        self.builder.UpdateEdge(edge, *lines, surface, self.place, _MARGIN * off)
         for end in parts_of(edge, TopAbs_VERTEX):
-            self.builder.UpdateVertex(as_vertex(end), off)
+            self.builder.UpdateVertex(as_vertex(end), _MARGIN * off)
 
     def _inwards(self, side: _Side, parameters: Floats) -> Floats:
         return -self.offsets[side.face].normals(plane_points(side.curve, parameters))

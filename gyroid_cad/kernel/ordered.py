@@ -219,7 +219,7 @@ def sorted_by_place(shapes: Iterable[Shape]) -> list[Shape]:
 
 
 def _whereabouts(shape: TopoDS_Shape) -> tuple[float, ...]:
-    """The length and the middle of a shape's edges, and how it runs: with its extent no two have all of it in common."""
+    """Length and middle of a shape's edges, and how it runs: with its extent no two have all of it in common."""
     lines = GProp_GProps()
     BRepGProp.LinearProperties_s(shape, lines)
     centre = lines.CentreOfMass()

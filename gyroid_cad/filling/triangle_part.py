@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.arrays import dot
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.graph import connected
@@ -36,6 +37,8 @@ Booleans = NDArray[np.bool_]
 
 # Corners nearer to each other are one, in parts of the part's size: above rounding in text of five digits.
 _WELDED = 1e-5
+# Share of a part's volume that its triangles may be off by.
+_LOST = 1e-3
 # Of what several solids hold together: less in common may be rounding, where they touch.
 _SHARED = 1e-6
 # What is expected at the route of exact solids, of what it has no use for.
@@ -155,7 +158,9 @@ def is_triangles(given: Any) -> bool:
     return isinstance(given, str | os.PathLike) and format_of(given) in TRIANGLE_FORMATS
 
 
-def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, repair: bool = False) -> TrianglePart:
+def triangle_part(
+    given: Any, solids: Sequence[str | int], deviation: float, repair: bool = False, closely: bool = False
+) -> TrianglePart:
     """The part that a user gives, by its triangles; solids that overlap or touch are united.
 
     Parameters
@@ -168,6 +173,8 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
         Of triangles from the faces of a B-rep, in mm.
     repair : bool
         Whether the triangles of a file may be mended.
+    closely : bool
+        Whether the triangles of a B-rep are finer where its volume would be off by more than 1e-3.
 
     Raises
     ------
@@ -179,6 +186,8 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
         return TrianglePart(*_body_of_file(given, repair))
     shape = compound_of(solid for _, solid in chosen_solids(*shapes_of(given), solid_names(solids)))
     meshes = solid_triangles(shape, deviation)
+    if closely and (finer := _LOST * _mean_depth(meshes)) < deviation:
+        meshes = solid_triangles(shape, finer)
     bodies: list[Body] = []
     remarks: list[str] = []
     for vertices, triangles, _ in meshes:
@@ -195,6 +204,17 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
     if common > _SHARED * whole.volume:
         remarks.append(f"{len(bodies)} solids have {common:.4g} mm3 in common: united")
     return TrianglePart(whole, tuple(remarks), shape, meshes)
+
+
+def _mean_depth(meshes: Sequence[tuple[Floats, Integers, Integers]]) -> float:
+    """Volume of some solids for their area, in mm: were all of it a share of that off, so would be the volume."""
+    volume, area = 0.0, 0.0
+    for vertices, triangles, _ in meshes:
+        a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
+        twice = np.cross(b - a, c - a)
+        volume += float(dot(a, twice).sum()) / 6
+        area += float(np.linalg.norm(twice, axis=1).sum()) / 2
+    return abs(volume) / area
 
 
 def _body_of_file(path: str | os.PathLike[str], repair: bool) -> tuple[Body, tuple[str, ...]]:

@@ -51,6 +51,7 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 # Of the triangles that distances are measured from, in parts of the largest extent.
@@ -175,9 +176,8 @@ class Part:
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
-        clouds = [spread_points(*triangles, spacing) for triangles in self._meshed(deflection)]
-        points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
-        return points, normals, spacing + deflection
+        a, b, c, face = _of_faces(self._meshed(deflection))
+        return *spread_points(a, b, c, spacing, face), spacing + deflection
 
 
 def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
@@ -257,11 +257,24 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
         yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
 
 
-def spread_points(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
-    """Points of triangles, their corners among them, so that no place is further than the spacing from one; normals."""
+def _of_faces(triangles: Iterable[tuple[Floats, Floats, Floats]]) -> tuple[Floats, Floats, Floats, Integers]:
+    """Corners of the triangles of all faces, three times (triangles, 3), and the face of each triangle."""
+    found = list(triangles)
+    a, b, c = (np.concatenate(corners) for corners in zip(*found, strict=True))
+    return a, b, c, np.repeat(np.arange(len(found)), [len(some) for some, _, _ in found])
+
+
+def spread_points(
+    a: Floats, b: Floats, c: Floats, spacing: float, face: Integers | None = None
+) -> tuple[Floats, Floats]:
+    """Points of triangles, their corners among them, so that no place is further than the spacing from one; normals.
+
+    A point that triangles of one face share is given once; of several faces, once for each.
+    """
+    face = np.zeros(len(a), dtype=np.int64) if face is None else face
     normals = unit(np.cross(b - a, c - a))
     steps = [np.ceil(np.linalg.norm(end - a, axis=1) / spacing).astype(int).clip(1) for end in (b, c)]
-    clouds, directions = [], []
+    clouds, directions, faces = [], [], []
     for along_b, along_c in np.unique(np.stack(steps, axis=1), axis=0).tolist():
         alike = (steps[0] == along_b) & (steps[1] == along_c)
         u, v = (np.linspace(0, 1, count + 1) for count in (along_b, along_c))
@@ -272,8 +285,11 @@ def spread_points(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floa
         cloud = a[alike] + u * (b - a)[alike] + v * (c - a)[alike]
         clouds.append(cloud.reshape(-1, 3))
         directions.append(np.broadcast_to(normals[alike], cloud.shape).reshape(-1, 3))
-    points, first = np.unique(np.concatenate(clouds), axis=0, return_index=True)
-    return points, np.concatenate(directions)[first]
+        faces.append(np.broadcast_to(face[alike], cloud.shape[:2]).ravel())
+    points = np.concatenate(clouds)
+    keys = np.column_stack([np.concatenate(faces), points])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return points[first], np.concatenate(directions)[first]
 
 
 OPENINGS = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'

@@ -44,8 +44,10 @@ class StraightLine:
     direction: Floats
 
     def __call__(self, t: Floats) -> tuple[Floats, ...]:
-        along = np.broadcast_to(self.direction, (len(t), len(self.direction)))
-        return self.origin + t[:, np.newaxis] * self.direction, along, np.zeros_like(along)
+        rates = np.zeros((2, len(t), len(self.direction)))
+        # Parts have thousands of these: numpy's broadcast_to and zeros_like would take most of the time.
+        rates[0] = self.direction
+        return self.origin + t[:, np.newaxis] * self.direction, rates[0], rates[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +73,11 @@ class BoundaryEdge:
     end: int
     tolerance: float
 
+    @property
+    def straight(self) -> bool:
+        """Whether it is known to be a straight line."""
+        return isinstance(self.curve, StraightLine)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coedge:
@@ -93,11 +100,17 @@ class Coedge:
     first: float
     last: float
 
+    def looked_at(self) -> Floats:
+        """A few points along it, (n, 2), its ends among them."""
+        # Of many-faceted parts nearly all time would go into the places between.
+        between = 0 if isinstance(self.curve, StraightLine) else _LEAST - 2
+        return self.curve(np.linspace(self.first, self.last, between + 2))[0]
+
     def polygon(self, sag: float, scale: Floats) -> Floats:
         """Points along it, the way it runs, (n, 2): no further from the curve than a sag, in parts of a scale."""
-        t = np.linspace(self.first, self.last, 2)
+        t = np.array([self.first, self.last])
         points = self.curve(t)[0]
-        while len(t) < _MOST:
+        while len(t) < _MOST and not isinstance(self.curve, StraightLine):
             between = (t[1:] + t[:-1]) / 2
             found = self.curve(between)[0]
             away = np.abs((found - (points[1:] + points[:-1]) / 2) / scale).max(axis=1)
@@ -149,9 +162,7 @@ class BoundaryFace:
     @cached_property
     def range(self) -> tuple[Floats, Floats]:
         """Least and largest parameters."""
-        points = np.concatenate(
-            [coedge.curve(np.linspace(coedge.first, coedge.last, _LEAST))[0] for coedge in self.coedges]
-        )
+        points = np.concatenate([coedge.looked_at() for coedge in self.coedges])
         scale = np.maximum(np.ptp(points, axis=0), np.finfo(float).tiny)
         # What lies beyond is cut off where areas are measured: a polygon of a thousandth's sag lost 1e-5 of a disc.
         points = np.concatenate([coedge.polygon(_SAGS[1], scale) for coedge in self.coedges])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.errors import KernelError
+from gyroid_cad.trim.loops import within_polygons
 from gyroid_cad.trim.surfaces import PartSurface, Quadric
 
 __all__ = ["Boundary", "BoundaryEdge", "BoundaryFace", "Coedge", "StraightLine"]
@@ -28,7 +29,6 @@ _DOUBTFUL = 3.0
 _LEAST, _MOST = 9, 2**14
 # Along an edge, to see how far its curves are apart.
 _LOOKED_AT = 101
-_AT_ONCE = 2**21
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,7 +194,7 @@ class BoundaryFace:
         for sag in _SAGS:
             if not len(left):
                 break
-            found, nearest = _within(own[left], *((end - low) / scale for end in self._sides(sag)))
+            found, nearest = within_polygons(own[left], *((end - low) / scale for end in self._sides(sag)))
             inside[left] = found
             left = left[nearest < _DOUBTFUL * sag]
         if len(left):
@@ -357,6 +357,11 @@ class Boundary:
         """Boxes round the faces: their lowest and highest corners, (faces, 3)."""
         return np.array([face.low for face in self.faces]), np.array([face.high for face in self.faces])
 
+    @cached_property
+    def spans(self) -> Floats:
+        """Ranges of the faces' parameters, (faces, 2)."""
+        return np.array([face.range[1] - face.range[0] for face in self.faces])
+
     def deviation(self, edge: int) -> float:
         """Largest distance of an edge's curve from its curves on the faces, in mm; its stated tolerance may be less.
 
@@ -377,20 +382,3 @@ class Boundary:
     @cached_property
     def _deviations(self) -> dict[int, float]:
         return {}
-
-
-def _within(places: Floats, start: Floats, end: Floats) -> tuple[Booleans, Floats]:
-    """Mask of the places that lie in polygons, and how far each is from the nearest side."""
-    inside, nearest = np.zeros(len(places), dtype=bool), np.zeros(len(places))
-    (x0, y0), (x1, y1) = start.T, end.T
-    squared = np.maximum((x1 - x0) ** 2 + (y1 - y0) ** 2, np.finfo(float).tiny)
-    count = max(1, _AT_ONCE // len(start))
-    for first in range(0, len(places), count):
-        some = slice(first, first + count)
-        x, y = places[some, 0, np.newaxis], places[some, 1, np.newaxis]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            beyond = x0 + (y - y0) / (y1 - y0) * (x1 - x0) > x
-        inside[some] = np.count_nonzero(((y0 > y) != (y1 > y)) & beyond, axis=1) % 2 == 1
-        along = np.clip(((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / squared, 0, 1)
-        nearest[some] = np.hypot(x0 + along * (x1 - x0) - x, y0 + along * (y1 - y0) - y).min(axis=1)
-    return inside, nearest

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import cadquery as cq
 import numpy as np
 import pytest
 import trimesh
@@ -92,3 +93,11 @@ def test_an_open_file_is_refused_with_its_holes_and_taken_if_it_may_be_repaired(
     (tmp_path / "empty.stl").write_bytes(b"")
     with pytest.raises(ParameterError, match="part = "):
         triangle_part(tmp_path / "empty.stl", (), 0.1)
+
+
+def test_thin_curved_parts_lose_next_to_nothing_of_their_volume_if_they_are_meshed_closely() -> None:
+    tube = cq.Workplane().circle(10).circle(9.6).extrude(20)
+    volume = tube.val().Volume()
+    coarse, close = (triangle_part(tube, (), 0.3, closely=closely).body.volume for closely in (False, True))
+    assert abs(coarse / volume - 1) > 0.01
+    assert close == pytest.approx(volume, rel=3e-4)

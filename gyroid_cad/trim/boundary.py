@@ -75,7 +75,7 @@ class BoundaryEdge:
 
     @property
     def straight(self) -> bool:
-        """Whether it is known to be a straight line."""
+        """Tell whether it is known to be a straight line."""
         return isinstance(self.curve, StraightLine)
 
 

@@ -12,6 +12,8 @@ import trimesh
 
 from gyroid_cad import ParameterError
 from gyroid_cad.filling.triangle_part import mended, sound_body, triangle_part
+from gyroid_cad.kernel.stl import solid_triangles
+from gyroid_cad.mesh.triangles.booleans import united
 from gyroid_cad.mesh.triangles.measures import holes_of
 
 
@@ -101,3 +103,14 @@ def test_thin_curved_parts_lose_next_to_nothing_of_their_volume_if_they_are_mesh
     coarse, close = (triangle_part(tube, (), 0.3, closely=closely).body.volume for closely in (False, True))
     assert abs(coarse / volume - 1) > 0.01
     assert close == pytest.approx(volume, rel=3e-4)
+
+
+def test_films_that_chords_leave_between_solids_that_touch_are_no_voids() -> None:
+    plate = cq.Workplane().box(20, 20, 8).faces(">Z").workplane().cboreHole(6.0, 11.0, 4.0)
+    bolt = cq.Workplane().circle(3.0).extrude(4.0).faces(">Z").workplane().circle(5.5).extrude(4.0)
+    shape = cq.Compound.makeCompound([plate.val(), bolt.val().move(z=-4.0)])
+    bare = united(sound_body(vertices, triangles)[0] for vertices, triangles, _ in solid_triangles(shape.wrapped, 0.02))
+    assert len(bare.shells()[0]) + len(bare.shells()[1]) > 1
+    part = triangle_part(shape.wrapped, (), 0.02)
+    assert (len(part.bodies()), part.body.void_count) == (1, 0)
+    assert part.body.volume == pytest.approx(20 * 20 * 8)

@@ -151,5 +151,5 @@ def test_the_same_cylinder_on_splines_is_of_free_form_all_over() -> None:
     cylinder = BRepPrimAPI_MakeCylinder(RADIUS, SIDE).Shape()
     part, splines = (require_part(shape) for shape in (cylinder, BRepBuilderAPI_NurbsConvert(cylinder).Shape()))
     assert part.free_form_area == 0
-    assert splines.free_form_area == pytest.approx(part.area, rel=1e-6)
+    assert splines.free_form_area == pytest.approx(part.area, rel=1e-3)
     assert (splines.volume, splines.face_count) == (pytest.approx(part.volume, rel=1e-6), part.face_count)

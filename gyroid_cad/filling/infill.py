@@ -23,6 +23,7 @@ from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
+from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
@@ -37,7 +38,7 @@ from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.offset import Wall, side_along
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
 from gyroid_cad.wall.self_intersection import require_simple
 
@@ -121,6 +122,20 @@ class Infill:
         gap = sum(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)) / 2
         aside = np.linalg.norm(own - places[nearest] - offsets[:, np.newaxis] * normals[nearest], axis=1)
         return np.asarray(region.contains(offsets, thickness[nearest] / 2) & (aside <= gap))
+
+    def bounding(self, region: Region, patches: Integers) -> tuple[LatticeFaces, Booleans]:
+        """Faces of some patches that bound a region, side walls too, and whether their normals point into it."""
+        kinds = [(patches, *side) for side in region.sides]
+        if not self.endless:
+            free = self.complex.free[self.complex.patch_edges[patches]]
+            kinds += [(patches[free[:, edge]], side_along(edge), False) for edge in range(4)]
+        patch, side, backwards = (
+            np.concatenate(some)
+            for some in zip(
+                *((own, np.full(len(own), side), np.full(len(own), back)) for own, side, back in kinds), strict=True
+            )
+        )
+        return LatticeFaces(self.wall, patch, side), backwards
 
     def faces(self, region: Region) -> list[list[Any]]:
         """The faces of every patch that bound a region, oriented out of it; neighbours share their edges."""

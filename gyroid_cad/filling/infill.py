@@ -15,7 +15,7 @@ from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
 from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
-from gyroid_cad.filling.forecast import Forecast, forecast_of
+from gyroid_cad.filling.forecast import Forecast, forecast_of, require_thicker
 from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -42,7 +42,7 @@ from gyroid_cad.wall.offset import Wall, side_along
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
 from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_thicker"]
+__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -221,33 +221,6 @@ def _foreseen(
         forecast.require_memory(cell_size)
     require_thicker(part, wall, thickness, density)
     return forecast
-
-
-def require_thicker(
-    part: Part | BoundedExtent, wall: float, thickness: FieldLike | None, density: FieldLike | None
-) -> None:
-    """Check that a part is somewhere thicker than the wall that is to fill it.
-
-    Parameters
-    ----------
-    part : Part or BoundedExtent
-        Of the latter the box is looked at.
-    wall : float
-        Whole wall where it is thickest, in mm; 0 where that is not known yet.
-    thickness, density : number or field, optional
-        As the user gave it.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not wall:
-        return
-    thickest = part.thickest(wall) if isinstance(part, Part) else float(np.min(part.high - part.low))
-    if thickest <= wall:
-        name, given = ("thickness", thickness) if density is None else ("density", density)
-        accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
-        raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def endless_infill(

@@ -32,7 +32,9 @@ CUBE = cq.Workplane().box(20, 20, 20).translate((3.1, 3, 3))
 ROD = cq.Workplane().circle(2.2).extrude(12).translate((3.1, 2.9, -3))
 WHERE_A_TURN_ENDS = cq.Workplane().box(6, 14, 5).rotate((0, 0, 0), (0, 0, 1), 40).translate((-8.2, -6.7, 2))
 
-pytestmark = pytest.mark.filterwarnings("ignore::gyroid_cad.PartWarning", "ignore::gyroid_cad.IslandsWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::gyroid_cad.PartWarning", "ignore::gyroid_cad.IslandsWarning", "ignore::gyroid_cad.SealedVoidsWarning"
+)
 
 
 def block(surface: Any = "gyroid", **given: Any) -> Lattice:
@@ -67,7 +69,7 @@ def test_a_wall_that_ends_within_a_part_is_left_whole(surface: str) -> None:
     made, wall = filled(CUBE, block(surface)).report, wall_in(CUBE, block(surface))
     areas = fitted_areas(wall)
     assert made.volume == pytest.approx(wall.volume(), rel=1e-12)
-    assert made.area == pytest.approx(areas.face_a + areas.face_b + areas.rim, rel=1e-9)
+    assert made.area == pytest.approx(areas.face_a + areas.face_b + areas.rim, rel=1e-6)
     assert made.faces == 2 * wall.complex.patch_count + int(wall.complex.free.sum())
 
 

@@ -38,6 +38,8 @@ _BEYOND = 0.5
 _MOST_POINTS = 2_000_000
 # Where a grid gives no manifold, another one a little finer mostly does.
 _FINER, _TRIES = 0.93, 4
+# Of the smallest void of a part, what is left of it at least where its triangles are simplified.
+_OWN = 0.5
 # Facets that turn by less belong to one flat region, as the cosine.
 _FLAT = np.cos(np.radians(1.0))
 
@@ -218,11 +220,14 @@ def without_small_voids(
     left: list[list[Body]] = []
     voids: list[SealedVoid] = []
     own = part.moved(-middle) if part.void_count else None
+    # Space outside the part is a void of its own, and no smaller than that: less is a film that a cut left there.
+    least_own = min((-_OWN * void.volume for void in part.shells()[1]), default=0.0)
     for piece in pieces:
         shells, sealed = piece.shells()
         if own is not None:
             parted = [(shell.inside_out() & own).volume > 0 for shell in sealed]
-            shells = shells + [shell for shell, in_part in zip(sealed, parted, strict=True) if not in_part]
+            voids_of_part = [shell for shell, in_part in zip(sealed, parted, strict=True) if not in_part]
+            shells = shells + [shell for shell in voids_of_part if -shell.volume >= least_own]
             sealed = [shell for shell, in_part in zip(sealed, parted, strict=True) if in_part]
         sealed = [shell for shell in sealed if -shell.volume >= least]
         left.append([*shells, *sealed])

@@ -38,6 +38,8 @@ Booleans = NDArray[np.bool_]
 _WELDED = 1e-5
 # Of what several solids hold together: less in common may be rounding, where they touch.
 _SHARED = 1e-6
+# Of the same, what is no solid.
+_NOTHING = 1e-12
 # What is expected at the route of exact solids, of what it has no use for.
 _AT_BREP = {
     "deviation": "none at route brep, whose solids write(deviation=...) meshes",
@@ -194,6 +196,9 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
     common = sum(body.volume for body in bodies) - whole.volume
     if common > _SHARED * whole.volume:
         remarks.append(f"{len(bodies)} solids have {common:.4g} mm3 in common: united")
+    if len(bodies) > 1:
+        # Where solids touch, the chords of their triangles leave films between them, some without any volume.
+        whole = whole.without_films(_NOTHING * whole.volume, _SHARED * whole.volume)
     return TrianglePart(whole, tuple(remarks), shape, meshes)
 
 

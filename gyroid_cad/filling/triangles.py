@@ -25,8 +25,9 @@ from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Regi
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import is_coarse, require_near_origin
+from gyroid_cad.mesh.triangles.storing import joined_meshes, storable_triangles, without_chips
 from gyroid_cad.mesh.triangles.triangulation import triangulated
-from gyroid_cad.mesh.triangles.writing import storable_triangles, write_triangles
+from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, triangles_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.trim.islands import (
@@ -299,7 +300,7 @@ class TriangleJob:
         report = joint_report(reports, whole.remarks)
         warn_of_voids(report.voids)
         warn_of_uncovered(report.uncovered)
-        return FilledTriangles(*_together(places), report)
+        return FilledTriangles(*joined_meshes(places), report)
 
     @property
     def _fineness(self) -> float:
@@ -331,23 +332,25 @@ class TriangleJob:
             pieces = {name: body.pieces() for name, body in domains.items()}
             kept, islands = without_islands(pieces, inner.body.volume / self.cell_size**3, self.rule)
             whole = [piece for some in kept.values() for piece in some]
+            speck = speck_below(self.cell_size)
             left, voids = [[piece] for piece in whole], list[SealedVoid]()
             if not any(region.fluid for region in self.regions):
-                left, voids = without_small_voids(whole, part.body, filling.middle, speck_below(self.cell_size))
-            places = _arrays([shell for shells in left for shell in shells], filling.middle, deviation)
-        return places, self._report(filling, left, islands, voids, skin, len(places[1])), islands
+                left, voids = without_small_voids(whole, part.body, filling.middle, speck)
+            shells = [shell for shells in left for shell in shells]
+            made, solids = _stored(shells, filling.middle, deviation, speck)
+        return made, self._report(filling, shells, islands, voids, skin, solids, len(made[1])), islands
 
     def _report(
         self,
         filling: TriangleFilling,
-        pieces: Sequence[Sequence[Body]],
+        shells: Sequence[Body],
         islands: Islands,
         voids: Sequence[SealedVoid],
         skin: float | None,
+        solids: int,
         count: int,
     ) -> FillReport:
         infill, part = filling.infill, filling.part
-        shells = [shell for piece in pieces for shell in piece]
         volume = sum(shell.volume for shell in shells)
         walls = [] if self.kind in (NETWORK_A, NETWORK_B) else [infill.min_thickness]
         return FillReport(
@@ -356,7 +359,7 @@ class TriangleJob:
             thickness=infill.max_thickness,
             min_wall=min([*walls, *([] if skin is None else [skin])], default=None),
             skin=skin,
-            solids=len(pieces),
+            solids=solids,
             faces=count,
             valid=True,
             closed=True,
@@ -383,18 +386,15 @@ class TriangleJob:
         )
 
 
-def _arrays(shells: Sequence[Body], middle: Floats, deviation: float) -> tuple[Floats, Integers]:
-    """Vertices and triangles of all shells where they stand; as single precision has them, if that is fine enough."""
-    vertices, triangles = _together([shell.triangles() for shell in shells])
+def _stored(
+    shells: Sequence[Body], middle: Floats, deviation: float, speck: float
+) -> tuple[tuple[Floats, Integers], int]:
+    """Vertices and triangles of all shells where they stand, as files can hold them, and how many bound solids."""
+    vertices, triangles = joined_meshes([shell.triangles() for shell in shells])
     vertices = vertices + middle
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    if is_coarse(float(np.abs(vertices).max()), size, deviation):
-        return vertices, triangles
-    return storable_triangles(vertices, triangles)
-
-
-def _together(bodies: Sequence[tuple[Floats, Integers]]) -> tuple[Floats, Integers]:
-    """Vertices and triangles of several bodies as those of one."""
-    counts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
-    triangles = [numbers + first for (_, numbers), first in zip(bodies, counts[:-1], strict=True)]
-    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(triangles)
+    # Where single precision is too coarse only files are written that have more.
+    single = not is_coarse(float(np.abs(vertices).max()), size, deviation)
+    stored = storable_triangles(vertices, triangles, single)
+    vertices, triangles, solids = without_chips(*stored, len(shells), speck)
+    return (vertices, triangles), solids

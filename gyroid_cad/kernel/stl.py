@@ -31,7 +31,8 @@ from gyroid_cad.kernel.surfaces import translation
 from gyroid_cad.mesh.triangles.files import binary_stl_corners, numbered_corners, renumbered
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import is_coarse
-from gyroid_cad.mesh.triangles.writing import storable_triangles, write_triangles
+from gyroid_cad.mesh.triangles.storing import storable_triangles
+from gyroid_cad.mesh.triangles.writing import write_triangles
 
 __all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "solid_triangles", "write_meshed_stl"]
 

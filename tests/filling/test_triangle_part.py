@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import cadquery as cq
 import numpy as np
 import pytest
 import trimesh
 
 from gyroid_cad import ParameterError
 from gyroid_cad.filling.triangle_part import mended, sound_body, triangle_part
+from gyroid_cad.kernel.stl import solid_triangles
+from gyroid_cad.mesh.triangles.booleans import united
 from gyroid_cad.mesh.triangles.measures import holes_of
 
 
@@ -92,3 +95,14 @@ def test_an_open_file_is_refused_with_its_holes_and_taken_if_it_may_be_repaired(
     (tmp_path / "empty.stl").write_bytes(b"")
     with pytest.raises(ParameterError, match="part = "):
         triangle_part(tmp_path / "empty.stl", (), 0.1)
+
+
+def test_films_that_chords_leave_between_solids_that_touch_are_no_voids() -> None:
+    plate = cq.Workplane().box(20, 20, 8).faces(">Z").workplane().cboreHole(6.0, 11.0, 4.0)
+    bolt = cq.Workplane().circle(3.0).extrude(4.0).faces(">Z").workplane().circle(5.5).extrude(4.0)
+    shape = cq.Compound.makeCompound([plate.val(), bolt.val().move(z=-4.0)])
+    bare = united(sound_body(vertices, triangles)[0] for vertices, triangles, _ in solid_triangles(shape.wrapped, 0.02))
+    assert len(bare.shells()[0]) + len(bare.shells()[1]) > 1
+    part = triangle_part(shape.wrapped, (), 0.02)
+    assert (len(part.bodies()), part.body.void_count) == (1, 0)
+    assert part.body.volume == pytest.approx(20 * 20 * 8)

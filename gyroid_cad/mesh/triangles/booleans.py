@@ -93,12 +93,32 @@ class Body:
         >>> [(round(piece.volume, 9), piece.void_count) for piece in (hollow | cube.moved(np.full(3, 5.0))).pieces()]
         [(8.0, 0), (7.0, 1)]
         """
+        return [self] if len(self._shells[0]) == 1 else self._pieces(0.0, 0.0)
+
+    def without_films(self, least_solid: float, least_void: float) -> Body:
+        """The body without pieces below a volume in mm3, and with voids below another filled in which nothing lies.
+
+        >>> cube = Body(Manifold.cube((2, 2, 2)))
+        >>> hollow = cube - Body(Manifold.cube((1, 1, 1))).moved(np.full(3, 0.5))
+        >>> [round(hollow.without_films(0.1, least).volume, 9) for least in (0.5, 2.0)]
+        [7.0, 8.0]
+        """
         solid, voids = self._shells
-        if len(solid) == 1:
-            return [self]
-        with_voids = {_smallest_round(void, solid) for void in voids}
-        # What the library decomposes are shells: one that goes round voids is intersected with the whole again.
-        found = [Body(self.manifold ^ shell if k in with_voids else shell) for k, shell in enumerate(solid)]
+        small = any(shell.volume() < least_solid for shell in solid) or any(
+            -void.volume() < least_void for void in voids
+        )
+        return united(self._pieces(least_solid, least_void)) if small else self
+
+    def _pieces(self, least_solid: float, least_void: float) -> list[Body]:
+        """Pieces and voids in them of some volume, the largest piece first."""
+        solid, voids = self._shells
+        solid = [shell for shell in solid if shell.volume() >= least_solid]
+        # What the library decomposes are shells. The whole within one would have what lies in its voids as well.
+        holes: list[list[Body]] = [[] for _ in solid]
+        for void in voids:
+            if -void.volume() >= least_void or any(_lies_in(shell, void) for shell in solid):
+                holes[_smallest_round(void, solid)].append(Body(void).inside_out())
+        found = [Body(shell) - united(some) if some else Body(shell) for shell, some in zip(solid, holes, strict=True)]
         return sorted(found, key=lambda piece: -piece.volume)
 
     @property
@@ -202,15 +222,20 @@ def united(bodies: Iterable[Body]) -> Body:
     return Body(Manifold.batch_boolean([body.manifold for body in bodies], OpType.Add))
 
 
+def _lies_in(inner: Manifold, outer: Manifold) -> bool:
+    """Tell whether one's box lies in the other's."""
+    (low, high), (least, most) = (np.array(one.bounding_box()).reshape(2, 3) for one in (inner, outer))
+    return bool(np.all(low >= least) and np.all(high <= most))
+
+
 def _smallest_round(void: Manifold, shells: Sequence[Manifold]) -> int:
     """Number of the smallest shell that goes round a void, by how often a ray from it crosses each."""
     start = np.array(void.to_mesh64().vert_properties[0, :3])
-    low, high = np.array(void.bounding_box()).reshape(2, 3)
     found, least = 0, np.inf
     for index, shell in enumerate(shells):
-        box = np.array(shell.bounding_box()).reshape(2, 3)
-        if np.any(box[0] > low) or np.any(box[1] < high) or shell.volume() >= least:
+        if not _lies_in(void, shell) or shell.volume() >= least:
             continue
+        box = np.array(shell.bounding_box()).reshape(2, 3)
         # A direction that no flat face of a part is likely to lie along.
         beyond = start + np.linalg.norm(box[1] - box[0]) * 1.5 * _ASKEW
         if len(shell.ray_cast(start.tolist(), beyond.tolist())) % 2:

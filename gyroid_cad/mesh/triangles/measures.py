@@ -17,6 +17,7 @@ __all__ = [
     "holes_of",
     "measured_walls",
     "open_edges",
+    "shell_labels",
     "surface_places",
     "triangle_measures",
     "unmatched_edges",
@@ -25,7 +26,6 @@ __all__ = [
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
-
 
 # Solid angle of a whole sphere, by which winding numbers are counted.
 _SPHERE = 4 * np.pi
@@ -135,6 +135,34 @@ def _edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers
     return order, first, one_way, uses
 
 
+def _neighbours(owner: Integers, first: Integers) -> tuple[Integers, Integers]:
+    """Pairs of triangles that use one edge, where uses of one follow one another."""
+    same = np.ones(max(len(owner) - 1, 0), dtype=np.bool_)
+    same[first[1:] - 1] = False
+    return owner[:-1][same], owner[1:][same]
+
+
+def shell_labels(triangles: NDArray[np.integer]) -> Integers:
+    """Label of the shell, of what is connected by edges, that each triangle is a part of.
+
+    Parameters
+    ----------
+    triangles : ndarray of int, shape (triangles, 3)
+
+    Returns
+    -------
+    ndarray of int, shape (triangles,)
+
+    Examples
+    --------
+    >>> shell_labels(np.array([[0, 1, 2], [3, 4, 5], [2, 1, 6]]))
+    array([0, 1, 0])
+    """
+    facets = np.asarray(triangles, dtype=np.int64)
+    order, first, *_ = _edge_uses(facets)
+    return connected(len(facets), *_neighbours(order // 3, first))
+
+
 @dataclass(frozen=True, slots=True)
 class Hole:
     """Edges of triangles that no other triangle shares, connected to each other."""
@@ -197,9 +225,8 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
     order, first, one_way, uses = _edge_uses(facets)
-    owner, same = order // 3, np.ones(max(len(order) - 1, 0), dtype=np.bool_)
-    same[first[1:] - 1] = False
-    labels = connected(len(facets), owner[:-1][same], owner[1:][same])
+    owner = order // 3
+    labels = connected(len(facets), *_neighbours(owner, first))
     opened = 2 * one_way != uses
     # Near the triangles, so that volumes far from the origin lose no digits.
     a, b, c = np.moveaxis(points[facets] - points.mean(axis=0), 1, 0)

@@ -22,76 +22,12 @@ from gyroid_cad.mesh.triangles.files import STL_RECORD, binary_stl_corners, read
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 from gyroid_cad.mesh.triangles.stl import STL_HEADER
 
-__all__ = ["storable_triangles", "write_3mf", "write_triangles"]
+__all__ = ["write_3mf", "write_triangles"]
 
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 Integers = NDArray[np.int64]
 
 # Of coordinates, so that single precision survives being written in decimals.
 _DECIMALS = 9
-# How often vertices that single precision makes one are moved apart, each time by twice as many of its steps.
-_TRIES = 8
-
-
-def storable_triangles(vertices: Floats, triangles: Integers) -> tuple[Floats, Integers]:
-    """Triangles that stay closed when their corners are rounded to single precision and numbered by coordinates alone.
-
-    Corners that become one are one, and triangles between them vanish; where two that do not belong together would
-    meet, they are moved apart by some steps of single precision, each into its own side.
-
-    Parameters
-    ----------
-    vertices : ndarray, shape (vertices, 3)
-        In mm.
-    triangles : ndarray of int, shape (triangles, 3)
-        Closed.
-
-    Returns
-    -------
-    vertices : ndarray, shape (fewer, 3)
-        Numbers that single precision has.
-    triangles : ndarray of int, shape (fewer, 3)
-
-    Raises
-    ------
-    ExportError
-        If they do not stay closed.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> len(storable_triangles(corners, sides)[1])
-    4
-    """
-    rounded = vertices.astype(np.float32)
-    for attempt in range(_TRIES):
-        places, numbers, _ = renumbered(rounded, triangles)
-        if not unmatched_edges(numbers):
-            return places.astype(np.float64), numbers
-        rounded = _parted(vertices, triangles, rounded, 2.0**attempt)
-    raise ExportError(
-        "nothing was written: its triangles do not stay closed in single precision; try another deviation"
-    )
-
-
-def _parted(vertices: Floats, triangles: Integers, rounded: Singles, steps: float) -> Singles:
-    """Corners that became one moved a few steps of single precision against the normals of their own triangles."""
-    _, which, count = np.unique(rounded, axis=0, return_inverse=True, return_counts=True)
-    together = np.flatnonzero(count[which.ravel()] > 1)
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    across = np.cross(b - a, c - a)
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(across[:, k], 3), len(vertices)) for k in range(3)], axis=1
-    )[together]
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    step = steps * float(np.spacing(np.abs(rounded).max()))
-    parted = rounded.copy()
-    # Where triangles have no area there are no normals, and sheets that lie on one another have the same.
-    aside = np.random.default_rng(len(together)).uniform(-0.5, 0.5, normals.shape)
-    parted[together] = vertices[together] - step * (normals + aside)
-    return parted
 
 
 def write_triangles(

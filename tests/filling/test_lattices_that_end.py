@@ -33,7 +33,9 @@ ROD = cq.Workplane().circle(2.2).extrude(12).translate((3.1, 2.9, -3))
 WHERE_A_TURN_ENDS = cq.Workplane().box(6, 14, 5).rotate((0, 0, 0), (0, 0, 1), 40).translate((-8.2, -6.7, 2))
 
 pytestmark = pytest.mark.filterwarnings(
-    "ignore::gyroid_cad.PartWarning", "ignore::gyroid_cad.IslandsWarning", "ignore::gyroid_cad.SealedVoidsWarning"
+    "ignore::gyroid_cad.PartWarning",
+    "ignore::gyroid_cad.IslandsWarning",
+    "ignore::gyroid_cad.errors.SealedVoidsWarning",
 )
 
 

@@ -21,8 +21,8 @@ from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
-from gyroid_cad.kernel.check import compound_of, is_valid, sealed_shells, topology, without_shells
-from gyroid_cad.kernel.part import Part, measure, require_part
+from gyroid_cad.kernel.check import compound_of, is_valid, measure, sealed_shells, topology, without_shells
+from gyroid_cad.kernel.part import Part, require_part, sound_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
@@ -258,7 +258,7 @@ def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[
         If a file is neither STEP nor BREP, or holds no shape.
     """
     separate, remarks = separate_solids(*shapes_of(given), solid_names(solids))
-    return [(name, require_part(solid)) for name, solid in separate], remarks
+    return [(name, sound_part(solid)) for name, solid in separate], remarks
 
 
 def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]]]:

@@ -203,7 +203,7 @@ def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats
     for number, one in enumerate(boundary.edges):
         if one.curve is None:
             continue
-        points, rates, *_ = one.curve(np.linspace(one.first, one.last, 33))
+        points, rates, *_ = one.curve(np.linspace(one.first, one.last, 2 if one.straight else 33))
         length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
         along = rates / np.maximum(np.linalg.norm(rates, axis=1, keepdims=True), np.finfo(float).tiny)
         turn = np.linalg.norm(np.diff(along, axis=0), axis=1).sum()

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.memory import require_room
+from gyroid_cad.errors import ParameterError
+from gyroid_cad.fields.field import FieldLike
+from gyroid_cad.filling.extent import BoundedExtent
 from gyroid_cad.kernel.part import Part
 
-__all__ = ["Forecast", "forecast_of", "require_cover"]
+__all__ = ["Forecast", "forecast_of", "require_cover", "require_thicker"]
 
 Floats = NDArray[np.float64]
 
@@ -132,6 +135,33 @@ def require_cover(low: Floats, high: Floats, cell_size: float, control_points: i
         return f"at least about {cell_size * (count * each / max(left, each)) ** (1 / 3):.3g} mm for this part"
 
     require_room("cell_size", cell_size, int(count * each), accepted, subject=f"about {count:,.0f} cells")
+
+
+def require_thicker(
+    part: Part | BoundedExtent, wall: float, thickness: FieldLike | None, density: FieldLike | None
+) -> None:
+    """Check that a part is somewhere thicker than the wall that is to fill it.
+
+    Parameters
+    ----------
+    part : Part or BoundedExtent
+        Of the latter the box is looked at.
+    wall : float
+        Whole wall where it is thickest, in mm; 0 where that is not known yet.
+    thickness, density : number or field, optional
+        As the user gave it.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not wall:
+        return
+    thickest = part.thickest(wall) if isinstance(part, Part) else float(np.min(part.high - part.low))
+    if thickest <= wall:
+        name, given = ("thickness", thickness) if density is None else ("density", density)
+        accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
+        raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def _round(number: float) -> int:

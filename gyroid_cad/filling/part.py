@@ -128,11 +128,11 @@ class Filling:
         attempts: list[tuple[Road, Point, int | None]] = [
             ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
-        # Side walls of a lattice that ends in the part are left to the kernel.
-        if infill_at(PERTURBATIONS[0]).endless:
-            attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
-            if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
-                attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
+        attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
+        # A box's sections know nothing of walls where a lattice ends.
+        single = self.hollow is None or len(self.part.solids) == 1
+        if self.core.box is not None and single and infill_at(PERTURBATIONS[0]).endless:
+            attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
             partial(self._attempt, number, infill_at, phase, points, road, processes)
             for number, (road, phase, processes) in enumerate(attempts, 1)

@@ -27,7 +27,7 @@ from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import as_face, as_solid
-from gyroid_cad.kernel.extent import bounding_box, box_of
+from gyroid_cad.kernel.extent import bounding_box, box_of, free_form_faces
 from gyroid_cad.kernel.repair import fault_of
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
@@ -95,6 +95,16 @@ class Part:
     volume: float
     box: Box | None = None
     area: float = 0.0
+
+    @cached_property
+    def face_count(self) -> int:
+        """Number of its faces."""
+        return sum(1 for _ in parts_of(self.shape, TopAbs_FACE))
+
+    @cached_property
+    def free_form_area(self) -> float:
+        """Of its area, in mm2, what is on surfaces that have no closed form."""
+        return sum(measure(face)[1] for face in free_form_faces(self.shape))
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,).

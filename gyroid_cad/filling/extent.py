@@ -223,6 +223,10 @@ def block_round(
             kept &= ((scaled >= domain[0] + free) & (scaled <= domain[1] - free)).all(axis=(1, 2))
         reach = _REACH * np.linalg.norm(images[kept, 1:] - images[kept, :1], axis=-1).max(axis=1)
         kept[kept] = extent.near(images[kept, 0], reach)
+        if not kept.any():
+            raise ParameterError(
+                "cells", cells, "a block that comes to the part: nothing of it does, so far as it goes on"
+            )
         return np.asarray(kept)
 
     (nx, ny, nz), (x, y, z) = count.tolist(), first.tolist()

@@ -15,7 +15,7 @@ from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
 from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
-from gyroid_cad.filling.forecast import Forecast, forecast_of
+from gyroid_cad.filling.forecast import Forecast, forecast_of, require_thicker
 from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
@@ -23,6 +23,7 @@ from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.fit_report import fit_within
+from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
@@ -37,11 +38,11 @@ from gyroid_cad.wall.distances import nearest_offsets
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.offset import Wall, side_along
 from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
 from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill", "require_thicker"]
+__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -121,6 +122,20 @@ class Infill:
         gap = sum(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)) / 2
         aside = np.linalg.norm(own - places[nearest] - offsets[:, np.newaxis] * normals[nearest], axis=1)
         return np.asarray(region.contains(offsets, thickness[nearest] / 2) & (aside <= gap))
+
+    def bounding(self, region: Region, patches: Integers) -> tuple[LatticeFaces, Booleans]:
+        """Faces of some patches that bound a region, side walls too, and whether their normals point into it."""
+        kinds = [(patches, *side) for side in region.sides]
+        if not self.endless:
+            free = self.complex.free[self.complex.patch_edges[patches]]
+            kinds += [(patches[free[:, edge]], side_along(edge), False) for edge in range(4)]
+        patch, side, backwards = (
+            np.concatenate(some)
+            for some in zip(
+                *((own, np.full(len(own), side), np.full(len(own), back)) for own, side, back in kinds), strict=True
+            )
+        )
+        return LatticeFaces(self.wall, patch, side), backwards
 
     def faces(self, region: Region) -> list[list[Any]]:
         """The faces of every patch that bound a region, oriented out of it; neighbours share their edges."""
@@ -206,33 +221,6 @@ def _foreseen(
         forecast.require_memory(cell_size)
     require_thicker(part, wall, thickness, density)
     return forecast
-
-
-def require_thicker(
-    part: Part | BoundedExtent, wall: float, thickness: FieldLike | None, density: FieldLike | None
-) -> None:
-    """Check that a part is somewhere thicker than the wall that is to fill it.
-
-    Parameters
-    ----------
-    part : Part or BoundedExtent
-        Of the latter the box is looked at.
-    wall : float
-        Whole wall where it is thickest, in mm; 0 where that is not known yet.
-    thickness, density : number or field, optional
-        As the user gave it.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not wall:
-        return
-    thickest = part.thickest(wall) if isinstance(part, Part) else float(np.min(part.high - part.low))
-    if thickest <= wall:
-        name, given = ("thickness", thickness) if density is None else ("density", density)
-        accepted = f"a wall below the part's thickness, about {thickest:.3g} mm where it is thickest"
-        raise ParameterError(name, given, f"{accepted}; it would be {wall:.6g} mm")
 
 
 def endless_infill(

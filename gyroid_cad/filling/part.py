@@ -21,8 +21,8 @@ from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
-from gyroid_cad.kernel.check import compound_of, is_valid, sealed_shells, topology, without_shells
-from gyroid_cad.kernel.part import Part, measure, require_part
+from gyroid_cad.kernel.check import compound_of, is_valid, measure, sealed_shells, topology, without_shells
+from gyroid_cad.kernel.part import Part, require_part, sound_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
@@ -128,11 +128,11 @@ class Filling:
         attempts: list[tuple[Road, Point, int | None]] = [
             ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
-        # Side walls of a lattice that ends in the part are left to the kernel.
-        if infill_at(PERTURBATIONS[0]).endless:
-            attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
-            if self.core.box is not None and (self.hollow is None or len(self.part.solids) == 1):
-                attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
+        attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
+        # A box's sections know nothing of walls where a lattice ends.
+        single = self.hollow is None or len(self.part.solids) == 1
+        if self.core.box is not None and single and infill_at(PERTURBATIONS[0]).endless:
+            attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
             partial(self._attempt, number, infill_at, phase, points, road, processes)
             for number, (road, phase, processes) in enumerate(attempts, 1)
@@ -258,7 +258,7 @@ def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[
         If a file is neither STEP nor BREP, or holds no shape.
     """
     separate, remarks = separate_solids(*shapes_of(given), solid_names(solids))
-    return [(name, require_part(solid)) for name, solid in separate], remarks
+    return [(name, sound_part(solid)) for name, solid in separate], remarks
 
 
 def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]]]:

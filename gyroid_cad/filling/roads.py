@@ -75,7 +75,7 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
     Parameters
     ----------
     road : {"sections", "crossings", "booleans"}
-        Sections are of a box alone; the first two of endless lattices, for they cut no side walls.
+        Sections are of a box alone, and of endless lattices, for they cut no side walls.
     job : Job
     infill : Infill
     processes : int, optional
@@ -156,9 +156,7 @@ def _crossed(
 
     with job.timed("cut"):
         cut = cross_part(
-            infill.wall,
-            crossing,
-            region.sides,
+            *infill.bounding(region, crossing),
             read.boundary,
             job.cell_size,
             job.core.contains,
@@ -166,19 +164,19 @@ def _crossed(
             outer=job.hollow is not None,
             progress=lambda done, count: report_progress(job.progress, "cut", done, count),
         )
-    whole = [(patch, side, backwards) for patch in inside.tolist() for side, backwards in region.sides]
+    whole = infill.bounding(region, inside)
     middle = (job.part.low + job.part.high) / 2
 
     def measured() -> PieceMeasures:
         return joined(
             lattice_measures(cut, middle),
             boundary_measures(cut, [*cut.inner, *cut.outer], middle),
-            whole_measures(infill.wall, whole, middle),
+            whole_measures(*whole, middle),
         )
 
     with beside(measured, "measures the faces") as measures:
         with job.timed("solid"):
-            pieces, faces = crossed_pieces(cut, read, whole)
+            pieces, faces = crossed_pieces(cut, read, *whole)
         with job.timed("measure"):
             sizes = FaceSizes([*pieces.inside, *pieces.boundary, *faces], measures(), middle)
     with job.timed("join"):

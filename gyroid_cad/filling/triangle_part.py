@@ -13,20 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gyroid_cad.common.arrays import dot
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.part import shapes_of, solid_names
 from gyroid_cad.filling.wanted import SURFACE
-from gyroid_cad.kernel.check import compound_of
-from gyroid_cad.kernel.part import face_numbers, points_within, spread_points
+from gyroid_cad.kernel.check import compound_of, volume_of
+from gyroid_cad.kernel.part import face_numbers, points_within
 from gyroid_cad.kernel.repair import chosen_solids
 from gyroid_cad.kernel.stl import solid_triangles
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import read_triangles
 from gyroid_cad.mesh.triangles.measures import Hole, holes_of, open_edges
+from gyroid_cad.mesh.triangles.spread import spread_points
 
 __all__ = ["TrianglePart", "is_triangles", "mended", "naming_triangles", "require_route", "sound_body", "triangle_part"]
 
@@ -36,6 +38,10 @@ Booleans = NDArray[np.bool_]
 
 # Corners nearer to each other are one, in parts of the part's size: above rounding in text of five digits.
 _WELDED = 1e-5
+# Share of a part's volume that its triangles may be off by: they are finer then, but not below a part of the usual.
+_MOST_LOST, _FINEST = 3e-4, 0.02
+# Of the kernel's integral that tells.
+_CLOSENESS = 1e-6
 # Of what several solids hold together: less in common may be rounding, where they touch.
 _SHARED = 1e-6
 # Of the same, what is no solid.
@@ -157,7 +163,9 @@ def is_triangles(given: Any) -> bool:
     return isinstance(given, str | os.PathLike) and format_of(given) in TRIANGLE_FORMATS
 
 
-def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, repair: bool = False) -> TrianglePart:
+def triangle_part(
+    given: Any, solids: Sequence[str | int], deviation: float, repair: bool = False, closely: bool = False
+) -> TrianglePart:
     """The part that a user gives, by its triangles; solids that overlap or touch are united.
 
     Parameters
@@ -170,6 +178,8 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
         Of triangles from the faces of a B-rep, in mm.
     repair : bool
         Whether the triangles of a file may be mended.
+    closely : bool
+        Whether the triangles of a B-rep are finer where its volume would be off by more than 3e-4.
 
     Raises
     ------
@@ -181,6 +191,8 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
         return TrianglePart(*_body_of_file(given, repair))
     shape = compound_of(solid for _, solid in chosen_solids(*shapes_of(given), solid_names(solids)))
     meshes = solid_triangles(shape, deviation)
+    if closely and (lost := _lost(shape, meshes)) > _MOST_LOST:
+        meshes = solid_triangles(shape, deviation * max(_MOST_LOST / lost, _FINEST) / 2)
     bodies: list[Body] = []
     remarks: list[str] = []
     for vertices, triangles, _ in meshes:
@@ -200,6 +212,15 @@ def triangle_part(given: Any, solids: Sequence[str | int], deviation: float, rep
         # Where solids touch, the chords of their triangles leave films between them, some without any volume.
         whole = whole.without_films(_NOTHING * whole.volume, _SHARED * whole.volume)
     return TrianglePart(whole, tuple(remarks), shape, meshes)
+
+
+def _lost(shape: Any, meshes: Sequence[tuple[Floats, Integers, Integers]]) -> float:
+    """Share of a shape's volume that its triangles are off by."""
+    volume = 0.0
+    for vertices, triangles, _ in meshes:
+        a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
+        volume += float(dot(a, np.cross(b, c)).sum()) / 6
+    return abs(volume / volume_of(shape, _CLOSENESS) - 1)
 
 
 def _body_of_file(path: str | os.PathLike[str], repair: bool) -> tuple[Body, tuple[str, ...]]:

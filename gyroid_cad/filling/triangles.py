@@ -280,7 +280,7 @@ class TriangleJob:
             require_meshing(finite_number("deviation", self.deviation))
         seconds: dict[str, float] = {}
         with timed(seconds, "part", self.progress):
-            whole = triangle_part(given, solids, self._fineness, repair)
+            whole = triangle_part(given, solids, self._fineness, repair, closely=self.deviation is None)
             opened = None if shell.skin is None else opened_facets(whole, shell.openings)
         for remark in whole.remarks:
             warn_caller(remark, PartWarning)

@@ -19,16 +19,25 @@ from gyroid_cad.kernel.boundary import ReadBoundary
 from gyroid_cad.kernel.check import measure_about, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.split import Change, Pieces
-from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, plane_curve
+from gyroid_cad.kernel.surfaces import (
+    TOLERANCE,
+    WallGeometry,
+    border_line,
+    kernel_curve,
+    plane_curve,
+    straight_curve,
+)
 from gyroid_cad.nurbs.surface import NurbsCurve
+from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.sections import section_knots
-from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["FaceSizes", "crossed_pieces"]
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 
 # Between what was measured between stations of a section curve and what the kernel finds elsewhere along it.
 _MARGIN = 2.0
@@ -36,7 +45,7 @@ _CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 
 
 def crossed_pieces(
-    cut: Crossing, read: ReadBoundary, whole: Iterable[tuple[int, int, bool]]
+    cut: Crossing, read: ReadBoundary, whole: LatticeFaces, backwards: Booleans
 ) -> tuple[Pieces, list[TopoDS_Face]]:
     """Pieces of a part and of a lattice's faces, and faces of the lattice that nothing has cut.
 
@@ -45,8 +54,10 @@ def crossed_pieces(
     cut : Crossing
     read : ReadBoundary
         Of the same boundary.
-    whole : iterable of (int, int, bool)
-        Patches and sides of further faces that lie in the part, and whether the region is on the side of the normal.
+    whole : LatticeFaces
+        Further faces, that lie in the part.
+    backwards : ndarray of bool, shape (faces,)
+        Whether the region is on the side that their normal points to.
 
     Returns
     -------
@@ -56,7 +67,7 @@ def crossed_pieces(
     work = _Realisation(cut, read)
     inside = [work.lattice_face(piece) for piece in cut.lattice]
     boundary = [(piece, work.part_face(piece)) for piece in [*cut.inner, *cut.outer]]
-    faces = [work.whole_face(patch, side, backwards) for patch, side, backwards in whole]
+    faces = work.whole_faces(whole, backwards)
     pieces = Pieces(
         tuple(inside), tuple(face for _, face in boundary), tuple(piece.face for piece, _ in boundary), work.changes()
     )
@@ -76,8 +87,8 @@ class _Realisation:
         self.rims: dict[int, TopoDS_Edge] = {}
         self.pieces_of: dict[int, list[tuple[float, int]]] = {}
         self.patch_edges = self.complex.patch_edges.tolist()
-        self.forward = self.complex.edge_forward.tolist()
         self.face_patch, self.face_side = cut.faces.patch.tolist(), cut.faces.side.tolist()
+        self.face_rims, self.face_forward = cut.faces.rims.tolist(), cut.faces.forward.tolist()
 
     # Vertices -------------------------------------------------------------------------------------------------------
 
@@ -120,11 +131,17 @@ class _Realisation:
     def rim(self, rim: int) -> TopoDS_Edge:
         """All of a rim."""
         if rim not in self.rims:
-            index = rim % self.complex.edge_count
-            side = rim // self.complex.edge_count
-            start, end = (side * self.complex.fan_count + self.complex.edge_fans[index]).tolist()
+            start, end = self._rim_ends(rim)
             self.rims[rim] = self._on_rim(rim, self.fan_vertex(start), self.fan_vertex(end), -1.0, 1.0)
         return self.rims[rim]
+
+    def _rim_ends(self, rim: int) -> tuple[int, int]:
+        side, index = divmod(rim, self.complex.edge_count)
+        if side in SIDES:
+            start, end = self.complex.edge_fans[index].tolist()
+            return side * self.complex.fan_count + start, side * self.complex.fan_count + end
+        fan = rim - len(SIDES) * self.complex.edge_count
+        return fan, self.complex.fan_count + fan
 
     def _rim_piece(self, _: int, edge: CutEdge) -> TopoDS_Edge:
         if edge.first == -1.0 and edge.last == 1.0:
@@ -133,10 +150,14 @@ class _Realisation:
 
     def _on_rim(self, rim: int, start: TopoDS_Vertex, end: TopoDS_Vertex, first: float, last: float) -> TopoDS_Edge:
         side, index = divmod(rim, self.complex.edge_count)
-        patch = int(self.complex.edge_patches[index, 0])
-        k = self.patch_edges[patch].index(index)
+        if side in SIDES:
+            patch = int(self.complex.edge_patches[index, 0])
+            k = self.patch_edges[patch].index(index)
+            curve, location = self.geometry.face_edge(patch, k, side), self.geometry.location(patch)
+        else:
+            curve, location = straight_curve(*map(self.fan_vertex, self._rim_ends(rim))), TopLoc_Location()
         edge = TopoDS_Edge()
-        self.builder.MakeEdge(edge, self.geometry.face_edge(patch, k, side), self.geometry.location(patch), TOLERANCE)
+        self.builder.MakeEdge(edge, curve, location, TOLERANCE)
         return self._bounded(edge, start, end, first, last)
 
     def _part_piece(self, number: int, edge: CutEdge) -> TopoDS_Edge:
@@ -185,8 +206,8 @@ class _Realisation:
             for number, _ in loop:
                 edge = self.cut.edges[number]
                 if edge.kind == "rim":
-                    k = self.patch_edges[patch].index(edge.number % self.complex.edge_count)
-                    line, tolerance = self.geometry.border(patch, k), TOLERANCE
+                    k = self.face_rims[piece.face].index(edge.number)
+                    line, tolerance = border_line(k, self.face_forward[piece.face][k]), TOLERANCE
                 else:
                     line, tolerance = (
                         _plane_section(self.cut.sections[edge.number].in_square),
@@ -197,15 +218,19 @@ class _Realisation:
         self.builder.NaturalRestriction(made, piece.whole)
         return as_face(made.Oriented(TopAbs_REVERSED)) if self.cut.backwards[piece.face] else made
 
-    def whole_face(self, patch: int, side: int, backwards: bool) -> TopoDS_Face:
+    def whole_faces(self, faces: LatticeFaces, backwards: Booleans) -> list[TopoDS_Face]:
+        numbers = (some.tolist() for some in (faces.patch, faces.side, faces.rims, faces.forward, backwards))
+        return [self._whole_face(*some) for some in zip(*numbers, strict=True)]
+
+    def _whole_face(self, patch: int, side: int, rims: list[int], forward: list[bool], backwards: bool) -> TopoDS_Face:
         surface, location = self.geometry.face(patch, side), self.geometry.location(patch)
         made, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(made, surface, location, TOLERANCE)
         self.builder.MakeWire(wire)
-        for k, index in enumerate(self.patch_edges[patch]):
-            edge = self.rim(side * self.complex.edge_count + index)
-            self.builder.UpdateEdge(edge, self.geometry.border(patch, k), surface, location, TOLERANCE)
-            self.builder.Add(wire, edge if self.forward[patch][k] else edge.Reversed())
+        for k, (rim, runs_on) in enumerate(zip(rims, forward, strict=True)):
+            edge = self.rim(rim)
+            self.builder.UpdateEdge(edge, border_line(k, runs_on), surface, location, TOLERANCE)
+            self.builder.Add(wire, edge if runs_on else edge.Reversed())
         wire.Closed(True)
         self.builder.Add(made, wire)
         self.builder.NaturalRestriction(made, True)

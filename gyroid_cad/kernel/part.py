@@ -23,16 +23,16 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from gyroid_cad.common.arrays import unit
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import as_face, as_solid
-from gyroid_cad.kernel.extent import bounding_box, box_of
+from gyroid_cad.kernel.extent import bounding_box, box_of, free_form_faces
 from gyroid_cad.kernel.repair import fault_of
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
+from gyroid_cad.mesh.triangles.spread import spread_points
 from gyroid_cad.trim.box import Box
 
 __all__ = [
@@ -41,17 +41,17 @@ __all__ = [
     "OPENINGS",
     "Part",
     "face_numbers",
-    "measure",
     "points_within",
     "require_part",
     "selected_faces",
     "selected_way",
-    "spread_points",
+    "sound_part",
     "triangles_by_face",
     "triangles_of",
 ]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 # Of the triangles that distances are measured from, in parts of the largest extent.
@@ -64,6 +64,8 @@ _CLASSIFYING_TOLERANCE = 1e-7
 # Where the thickness is looked at: at so many places at most, so many along the largest extent, by balls of which each
 # has so much of the last; and how near the next face they may come, in parts of their radius.
 _THICKNESS_PLACES, _THICKNESS_STEPS, _SMALLER, _AS_DEEP = 1500, 60, 0.9, 0.98
+# With which a part is measured, once.
+_CLOSENESS = 1e-8
 # Of a part that takes up little of its box fewer points are found than are asked for.
 _MOST_BATCHES = 8
 
@@ -94,6 +96,16 @@ class Part:
     volume: float
     box: Box | None = None
     area: float = 0.0
+
+    @cached_property
+    def face_count(self) -> int:
+        """Number of its faces."""
+        return sum(1 for _ in parts_of(self.shape, TopAbs_FACE))
+
+    @cached_property
+    def free_form_area(self) -> float:
+        """Of its area, in mm2, what is on surfaces that have no closed form."""
+        return sum(measure(face)[1] for face in free_form_faces(self.shape))
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,).
@@ -176,9 +188,8 @@ class Part:
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
-        clouds = [spread_points(*triangles, spacing) for triangles in self._meshed(deflection)]
-        points, normals = (np.concatenate(some) for some in zip(*clouds, strict=True))
-        return points, normals, spacing + deflection
+        a, b, c, face = _of_faces(self._meshed(deflection))
+        return *spread_points(a, b, c, spacing, face), spacing + deflection
 
 
 def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
@@ -225,8 +236,13 @@ def require_part(shape: TopoDS_Shape, parameter: str = "part") -> Part:
     for index, solid in enumerate(solids, 1):
         if fault := fault_of(solid, "its solid" if len(solids) == 1 else f"solid {index} of {len(solids)}"):
             raise ParameterError(parameter, kind, fault)
+    return sound_part(shape)
+
+
+def sound_part(shape: TopoDS_Shape) -> Part:
+    """A part of solids that are known to be sound, and to have no space in common."""
     low, high = bounding_box(shape)
-    volume, area = (sum(sizes) for sizes in zip(*map(measure, solids), strict=True))
+    volume, area = measure(shape, _CLOSENESS)
     divided = _without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
     return Part(divided, solids, low, high, volume, box_of(solids), area)
@@ -240,7 +256,7 @@ def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
     divide = ShapeUpgrade_ShapeDivideClosed(shape)
     divide.Perform()
     divided = divide.Result()
-    if divided is None or divided.IsNull():
+    if divided is None or divided.IsNull() or divided.IsSame(shape):
         return shape
     if is_valid(divided):
         return divided
@@ -266,23 +282,11 @@ def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
         yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
 
 
-def spread_points(a: Floats, b: Floats, c: Floats, spacing: float) -> tuple[Floats, Floats]:
-    """Points of triangles, their corners among them, so that no place is further than the spacing from one; normals."""
-    normals = unit(np.cross(b - a, c - a))
-    steps = [np.ceil(np.linalg.norm(end - a, axis=1) / spacing).astype(int).clip(1) for end in (b, c)]
-    clouds, directions = [], []
-    for along_b, along_c in np.unique(np.stack(steps, axis=1), axis=0).tolist():
-        alike = (steps[0] == along_b) & (steps[1] == along_c)
-        u, v = (np.linspace(0, 1, count + 1) for count in (along_b, along_c))
-        u, v = (grid.ravel() for grid in np.meshgrid(u, v))
-        # Beyond the third side points are moved onto it: a place near it is then no further from one.
-        excess = np.maximum(u + v, 1)
-        u, v = (u / excess)[:, np.newaxis, np.newaxis], (v / excess)[:, np.newaxis, np.newaxis]
-        cloud = a[alike] + u * (b - a)[alike] + v * (c - a)[alike]
-        clouds.append(cloud.reshape(-1, 3))
-        directions.append(np.broadcast_to(normals[alike], cloud.shape).reshape(-1, 3))
-    points, first = np.unique(np.concatenate(clouds), axis=0, return_index=True)
-    return points, np.concatenate(directions)[first]
+def _of_faces(triangles: Iterable[tuple[Floats, Floats, Floats]]) -> tuple[Floats, Floats, Floats, Integers]:
+    """Corners of the triangles of all faces, three times (triangles, 3), and the face of each triangle."""
+    found = list(triangles)
+    a, b, c = (np.concatenate(corners) for corners in zip(*found, strict=True))
+    return a, b, c, np.repeat(np.arange(len(found)), [len(some) for some, _, _ in found])
 
 
 OPENINGS = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'

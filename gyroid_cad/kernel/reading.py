@@ -13,10 +13,9 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.kernel.apart import read_shape
-from gyroid_cad.kernel.check import Topology, is_valid, parts_of, topology
+from gyroid_cad.kernel.check import Topology, is_valid, measure, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import bounding_box
-from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.stl import diagonal, meshed_by_face
 
 __all__ = ["Described", "described", "lattice_sides", "read_shape", "shown_triangles"]

@@ -19,7 +19,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, topology
+from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology, volume_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_shell
 from gyroid_cad.kernel.extent import box_round, corners_of
 
@@ -67,6 +67,8 @@ def separate_solids(
         title = " and ".join(sound[index][0] for index in own)
         separate += [(title, solid) for solid in solids]
         if len(own) > 1:
+            for solid in solids:
+                _require_sound(solid, title)
             remarks.append(f"{title} have {overlap:.4g} mm3 in common: united")
     return separate, remarks
 
@@ -122,6 +124,11 @@ def _sound(title: str, shape: TopoDS_Shape, remarks: list[str]) -> list[Named]:
     return [(title, solid) for solid in solids]
 
 
+def _require_sound(solid: TopoDS_Shape, title: str) -> None:
+    if fault := fault_of(solid, title):
+        raise ParameterError("part", "solid", fault)
+
+
 def fault_of(solid: TopoDS_Shape, which: str) -> str:
     """Fault of a solid and its place, after what is expected of it; nothing of one closed, valid and right side out.
 
@@ -135,7 +142,7 @@ def fault_of(solid: TopoDS_Shape, which: str) -> str:
         return f"a closed solid: {which} has {open_edges} open edges{_first_open(solid)}"
     if not is_valid(solid):
         return f"a valid solid: the kernel finds fault with {which}{_first_invalid(solid)}"
-    return "" if measure(solid)[0] > 0 else f"a solid of positive volume: {which} is inside out"
+    return "" if volume_of(solid) > 0 else f"a solid of positive volume: {which} is inside out"
 
 
 def _repaired(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
@@ -164,8 +171,8 @@ def _united(solids: Sequence[TopoDS_Shape]) -> list[tuple[list[int], list[TopoDS
     for first, second in combinations(range(len(solids)), 2):
         if boxes[first].IsOut(boxes[second]):
             continue
-        common = measure(BRepAlgoAPI_Common(solids[first], solids[second]).Shape())[0]
-        if common > _SHARED * min(measure(solids[first])[0], measure(solids[second])[0]):
+        common = volume_of(BRepAlgoAPI_Common(solids[first], solids[second]).Shape())
+        if common > _SHARED * min(volume_of(solids[first]), volume_of(solids[second])):
             pairs.append((first, second))
             volumes.append(common)
     both = np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -205,7 +212,7 @@ def _sewn(shape: TopoDS_Shape) -> TopoDS_Shape:
 
 def _turned_outwards(shape: TopoDS_Shape) -> TopoDS_Shape:
     solids = parts_of(shape, TopAbs_SOLID)
-    return compound_of(solid if measure(solid)[0] > 0 else solid.Reversed() for solid in solids)
+    return compound_of(solid if volume_of(solid) > 0 else solid.Reversed() for solid in solids)
 
 
 def _first_open(solid: TopoDS_Shape) -> str:

@@ -21,12 +21,12 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.kernel.check import compound_of, is_valid, parts_of
+from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import core_of
-from gyroid_cad.kernel.part import Part, measure, require_part, selected_faces
+from gyroid_cad.kernel.part import Part, require_part, selected_faces
 from gyroid_cad.kernel.shells import VolumeOf, solids_of
 from gyroid_cad.kernel.sieve import with_changes
 from gyroid_cad.kernel.split import Pieces, changes, general_fuse, inner_sides, modified

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRep import BRep_Builder
 from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
@@ -28,9 +28,8 @@ from OCP.TopoDS import (
 )
 
 from gyroid_cad.kernel.compat import as_compound, as_face, as_shell, as_solid
-from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, kernel_curve, parameter_line
-from gyroid_cad.nurbs.surface import NurbsCurve
-from gyroid_cad.wall.offset import SIDES, Wall
+from gyroid_cad.kernel.surfaces import TOLERANCE, WallGeometry, parameter_line, straight_curve
+from gyroid_cad.wall.offset import SIDES, Wall, side_along
 
 __all__ = [
     "TOLERANCE",
@@ -124,7 +123,7 @@ class _Realisation:
         self.patch_edges = self.complex.patch_edges.tolist()
         self.patch_fans = self.complex.patch_fans.tolist()
         self.edge_forward = self.complex.edge_forward.tolist()
-        self.rim_lines = [(parameter_line(0, height, -1, 0), parameter_line(0, height, 1, 0)) for height in (0, 1)]
+        self.rim_lines = [(parameter_line(0, v, -1, 0), parameter_line(0, v, 1, 0)) for v in (-1, 1)]
         self.post_lines = [parameter_line(u, 0, 0, 1) for u in (-1, 1)]
 
     def build(self, progress: Callable[[int, int], None]) -> TopoDS_Shape:
@@ -226,11 +225,9 @@ class _Realisation:
         posts = {}
         for fan in np.flatnonzero(self.complex.border_fans).tolist():
             below, above = (self.vertices[side][fan] for side in SIDES)
-            ends = np.array([_position(below), _position(above)])
-            line = kernel_curve(NurbsCurve(ends, np.ones(2), np.array([0.0, 0.0, 1.0, 1.0])))
             edge = TopoDS_Edge()
-            self.builder.MakeEdge(edge, line, self.identity, TOLERANCE)
-            self._bound(edge, below, above, 0.0, 1.0)
+            self.builder.MakeEdge(edge, straight_curve(below, above), self.identity, TOLERANCE)
+            self._bound(edge, below, above, -1.0, 1.0)
             posts[fan] = edge
         return posts
 
@@ -251,7 +248,7 @@ class _Realisation:
         return self._closed(face, wire)
 
     def _make_side_wall(self, patch: int, k: int) -> TopoDS_Face:
-        surface, location = self.geometry.side_wall(patch, k), self.geometry.location(patch)
+        surface, location = self.geometry.face(patch, side_along(k)), self.geometry.location(patch)
         face, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(face, surface, location, TOLERANCE)
         self.builder.MakeWire(wire)
@@ -274,8 +271,3 @@ class _Realisation:
         self.builder.Add(face, wire)
         self.builder.NaturalRestriction(face, True)
         return face
-
-
-def _position(vertex: TopoDS_Vertex) -> tuple[float, float, float]:
-    point = BRep_Tool.Pnt_s(vertex)
-    return point.X(), point.Y(), point.Z()

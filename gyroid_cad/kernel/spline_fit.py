@@ -14,6 +14,7 @@ from OCP.gp import gp_Pnt2d
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.compat import Point2dArray
 from gyroid_cad.kernel.surfaces import kernel_curve, kernel_knots, kernel_surface
+from gyroid_cad.nurbs.basis import greville
 from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
 
 __all__ = ["fitted_curve", "fitted_plane_curve", "fitted_surface"]
@@ -67,7 +68,7 @@ def _curve(points_at: Callable[[Floats], Floats], breaks: Sequence[float], toler
     while True:
         ends = _divided(np.asarray(breaks, dtype=float), count)
         knots = _knots(ends, breaks)
-        places = _places(knots)
+        places = greville(knots, _DEGREE)
         spline = scipy.interpolate.make_interp_spline(places, points_at(places), k=_DEGREE, t=knots)
         between = np.concatenate([ends[:-1] + part * np.diff(ends) for part in _BETWEEN])
         if np.abs(spline(between) - points_at(between)).max() < tolerance:
@@ -103,7 +104,7 @@ def fitted_surface(
     while True:
         ends = [_divided(np.unique(breaks), count) for breaks, count in zip((breaks_u, breaks_v), counts, strict=True)]
         knots = [_knots(some, breaks) for some, breaks in zip(ends, (breaks_u, breaks_v), strict=True)]
-        u, v = map(_places, knots)
+        u, v = (greville(some, _DEGREE) for some in knots)
         along = scipy.interpolate.make_interp_spline(u, points_at(u, v), k=_DEGREE, t=knots[0])
         poles = scipy.interpolate.make_interp_spline(v, along.c.swapaxes(0, 1), k=_DEGREE, t=knots[1]).c.swapaxes(0, 1)
         off = [
@@ -140,12 +141,6 @@ def _knots(ends: Floats, breaks: Sequence[float]) -> Floats:
     kinks = np.isin(ends, values[counts > 1])
     inner = np.repeat(ends, np.where(kinks, _DEGREE, 1))
     return np.concatenate([np.repeat(ends[0], _DEGREE), inner, np.repeat(ends[-1], _DEGREE)])
-
-
-def _places(knots: Floats) -> Floats:
-    """As many places as a spline has poles: averages of knots (Greville)."""
-    places = np.array([knots[i + 1 : i + 1 + _DEGREE].mean() for i in range(len(knots) - _DEGREE - 1)])
-    return np.asarray(np.clip(places, knots[0], knots[-1]))
 
 
 def _between(ends: Floats) -> Floats:

@@ -6,23 +6,27 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
 from OCP.Geom import Geom_BSplineCurve, Geom_BSplineSurface
 from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Line
 from OCP.gp import gp_Dir2d, gp_Pnt, gp_Pnt2d, gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Vertex
 
 from gyroid_cad.kernel.compat import IntegerArray, Point2dArray, PointArray, PointGrid, RealArray, RealGrid
 from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
-from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.offset import Wall, side_along
 
 __all__ = [
     "TOLERANCE",
     "WallGeometry",
+    "border_line",
     "kernel_curve",
     "kernel_knots",
     "kernel_surface",
     "nurbs_of_surface",
     "parameter_line",
+    "straight_curve",
     "translation",
 ]
 
@@ -125,26 +129,18 @@ class WallGeometry:
         self._patch_net, self._patch_shift = wall.patch_net.tolist(), wall.patch_shift.tolist()
         self._forward = wall.complex.edge_forward.tolist()
         self._faces: dict[tuple[int, int], Geom_BSplineSurface] = {}
-        self._side_walls: dict[tuple[int, int], Geom_BSplineSurface] = {}
         self._rims: dict[tuple[int, int, int, bool], Geom_BSplineCurve] = {}
-        self._borders = _border_lines()
 
     def location(self, patch: int) -> TopLoc_Location:
         return self._locations[self._patch_shift[patch]]
 
     def face(self, patch: int, side: int) -> Geom_BSplineSurface:
-        """A face of the wall."""
+        """A side of the wall, or from :func:`side_along` on the ruled surface through it along a border."""
         key = (self._patch_net[patch], side)
         if key not in self._faces:
-            self._faces[key] = kernel_surface(self.wall.face(*key))
+            net, edge = key[0], side - side_along(0)
+            self._faces[key] = kernel_surface(self.wall.face(*key) if edge < 0 else self.wall.side_wall(net, edge))
         return self._faces[key]
-
-    def side_wall(self, patch: int, k: int) -> Geom_BSplineSurface:
-        """The ruled surface through the wall along border k."""
-        key = (self._patch_net[patch], k)
-        if key not in self._side_walls:
-            self._side_walls[key] = kernel_surface(self.wall.side_wall(*key))
-        return self._side_walls[key]
 
     def face_edge(self, patch: int, k: int, side: int) -> Geom_BSplineCurve:
         """Border curve k of a face, run the way the complex's edge runs, on [-1, 1]."""
@@ -157,7 +153,13 @@ class WallGeometry:
 
     def border(self, patch: int, k: int) -> Geom2d_Line:
         """Border k in the parameter plane, run the way the complex's edge runs."""
-        return self._borders[k][self._forward[patch][k]]
+        return border_line(k, self._forward[patch][k])
+
+
+def straight_curve(start: TopoDS_Vertex, end: TopoDS_Vertex) -> Geom_BSplineCurve:
+    """The straight curve from a vertex to another, on [-1, 1]."""
+    ends = np.array([(point.X(), point.Y(), point.Z()) for point in map(BRep_Tool.Pnt_s, (start, end))])
+    return kernel_curve(NurbsCurve(ends, np.ones(2), np.array([-1.0, -1.0, 1.0, 1.0])))
 
 
 def parameter_line(u: float, v: float, du: float, dv: float) -> Geom2d_Line:
@@ -165,14 +167,11 @@ def parameter_line(u: float, v: float, du: float, dv: float) -> Geom2d_Line:
     return Geom2d_Line(gp_Pnt2d(u, v), gp_Dir2d(du, dv))
 
 
-def _border_lines() -> list[tuple[Geom2d_Line, Geom2d_Line]]:
-    """The square's four sides in the parameter plane, for edges that run against and along the patch."""
-    starts = ((0, -1), (1, 0), (0, 1), (-1, 0))
-    directions = ((1, 0), (0, 1), (-1, 0), (0, -1))
-    return [
-        (parameter_line(*start, -du, -dv), parameter_line(*start, du, dv))
-        for start, (du, dv) in zip(starts, directions, strict=True)
-    ]
+@lru_cache(maxsize=8)
+def border_line(k: int, forward: bool) -> Geom2d_Line:
+    """Side k of the square in the parameter plane, run round it or against that."""
+    start, (du, dv) = ((0, -1), (1, 0), (0, 1), (-1, 0))[k], ((1, 0), (0, 1), (-1, 0), (0, -1))[k]
+    return parameter_line(*start, du, dv) if forward else parameter_line(*start, -du, -dv)
 
 
 def translation(shift: list[float]) -> TopLoc_Location:

@@ -19,6 +19,7 @@ __all__ = [
     "basis",
     "component_images",
     "gauss_points",
+    "greville",
     "images",
     "orders",
     "quotients",
@@ -37,6 +38,28 @@ def uniform_knots(control_points: int, degree: int = 3) -> Floats:
     """Clamped knot vector on [-1, 1] with evenly spaced inner knots; shape (control_points + degree + 1,)."""
     inner = np.linspace(-1.0, 1.0, control_points - degree + 1)
     return np.concatenate([np.full(degree, -1.0), inner, np.full(degree, 1.0)])
+
+
+def greville(knots: Floats, degree: int) -> Floats:
+    """Places of control points that make a straight line of itself: averages of so many knots as the degree (Greville).
+
+    Parameters
+    ----------
+    knots : ndarray, shape (n + degree + 1,)
+        Clamped.
+    degree : int
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Examples
+    --------
+    >>> greville(uniform_knots(5), 3).round(6).tolist()
+    [-1.0, -0.666667, 0.0, 0.666667, 1.0]
+    """
+    places = np.lib.stride_tricks.sliding_window_view(knots[1:-1], degree).mean(axis=1)
+    return np.asarray(np.clip(places, knots[0], knots[-1]))
 
 
 def basis(knots: Floats, degree: int, parameters: ArrayLike, derivative: int = 0) -> Floats:

@@ -30,7 +30,7 @@ REST = 2
 _MOST_SQUARES, _FEWEST_SQUARES = 10, 1
 _MOST_TRIANGLES = 1_200_000
 # Places through the wall, on the side walls, which may be broad and twisted.
-_THROUGH = np.linspace(0.0, 1.0, 7)[np.newaxis]
+_THROUGH = np.linspace(-1.0, 1.0, 7)[np.newaxis]
 # Cosine of the angle between triangles from which on their common edge is sharp.
 _SHARP = 0.82
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.errors import KernelError
+from gyroid_cad.trim.loops import within_polygons
 from gyroid_cad.trim.surfaces import PartSurface, Quadric
 
 __all__ = ["Boundary", "BoundaryEdge", "BoundaryFace", "Coedge", "StraightLine"]
@@ -28,7 +29,6 @@ _DOUBTFUL = 3.0
 _LEAST, _MOST = 9, 2**14
 # Along an edge, to see how far its curves are apart.
 _LOOKED_AT = 101
-_AT_ONCE = 2**21
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +44,10 @@ class StraightLine:
     direction: Floats
 
     def __call__(self, t: Floats) -> tuple[Floats, ...]:
-        along = np.broadcast_to(self.direction, (len(t), len(self.direction)))
-        return self.origin + t[:, np.newaxis] * self.direction, along, np.zeros_like(along)
+        rates = np.zeros((2, len(t), len(self.direction)))
+        # Parts have thousands of these: numpy's broadcast_to and zeros_like would take most of the time.
+        rates[0] = self.direction
+        return self.origin + t[:, np.newaxis] * self.direction, rates[0], rates[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +73,11 @@ class BoundaryEdge:
     end: int
     tolerance: float
 
+    @property
+    def straight(self) -> bool:
+        """Tell whether it is known to be a straight line."""
+        return isinstance(self.curve, StraightLine)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coedge:
@@ -93,11 +100,17 @@ class Coedge:
     first: float
     last: float
 
+    def looked_at(self) -> Floats:
+        """A few points along it, (n, 2), its ends among them."""
+        # Of many-faceted parts nearly all time would go into the places between.
+        between = 0 if isinstance(self.curve, StraightLine) else _LEAST - 2
+        return self.curve(np.linspace(self.first, self.last, between + 2))[0]
+
     def polygon(self, sag: float, scale: Floats) -> Floats:
         """Points along it, the way it runs, (n, 2): no further from the curve than a sag, in parts of a scale."""
-        t = np.linspace(self.first, self.last, 2)
+        t = np.array([self.first, self.last])
         points = self.curve(t)[0]
-        while len(t) < _MOST:
+        while len(t) < _MOST and not isinstance(self.curve, StraightLine):
             between = (t[1:] + t[:-1]) / 2
             found = self.curve(between)[0]
             away = np.abs((found - (points[1:] + points[:-1]) / 2) / scale).max(axis=1)
@@ -149,9 +162,7 @@ class BoundaryFace:
     @cached_property
     def range(self) -> tuple[Floats, Floats]:
         """Least and largest parameters."""
-        points = np.concatenate(
-            [coedge.curve(np.linspace(coedge.first, coedge.last, _LEAST))[0] for coedge in self.coedges]
-        )
+        points = np.concatenate([coedge.looked_at() for coedge in self.coedges])
         scale = np.maximum(np.ptp(points, axis=0), np.finfo(float).tiny)
         # What lies beyond is cut off where areas are measured: a polygon of a thousandth's sag lost 1e-5 of a disc.
         points = np.concatenate([coedge.polygon(_SAGS[1], scale) for coedge in self.coedges])
@@ -183,7 +194,7 @@ class BoundaryFace:
         for sag in _SAGS:
             if not len(left):
                 break
-            found, nearest = _within(own[left], *((end - low) / scale for end in self._sides(sag)))
+            found, nearest = within_polygons(own[left], *((end - low) / scale for end in self._sides(sag)))
             inside[left] = found
             left = left[nearest < _DOUBTFUL * sag]
         if len(left):
@@ -346,6 +357,11 @@ class Boundary:
         """Boxes round the faces: their lowest and highest corners, (faces, 3)."""
         return np.array([face.low for face in self.faces]), np.array([face.high for face in self.faces])
 
+    @cached_property
+    def spans(self) -> Floats:
+        """Ranges of the faces' parameters, (faces, 2)."""
+        return np.array([face.range[1] - face.range[0] for face in self.faces])
+
     def deviation(self, edge: int) -> float:
         """Largest distance of an edge's curve from its curves on the faces, in mm; its stated tolerance may be less.
 
@@ -366,20 +382,3 @@ class Boundary:
     @cached_property
     def _deviations(self) -> dict[int, float]:
         return {}
-
-
-def _within(places: Floats, start: Floats, end: Floats) -> tuple[Booleans, Floats]:
-    """Mask of the places that lie in polygons, and how far each is from the nearest side."""
-    inside, nearest = np.zeros(len(places), dtype=bool), np.zeros(len(places))
-    (x0, y0), (x1, y1) = start.T, end.T
-    squared = np.maximum((x1 - x0) ** 2 + (y1 - y0) ** 2, np.finfo(float).tiny)
-    count = max(1, _AT_ONCE // len(start))
-    for first in range(0, len(places), count):
-        some = slice(first, first + count)
-        x, y = places[some, 0, np.newaxis], places[some, 1, np.newaxis]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            beyond = x0 + (y - y0) / (y1 - y0) * (x1 - x0) > x
-        inside[some] = np.count_nonzero(((y0 > y) != (y1 > y)) & beyond, axis=1) % 2 == 1
-        along = np.clip(((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / squared, 0, 1)
-        nearest[some] = np.hypot(x0 + along * (x1 - x0) - x, y0 + along * (y1 - y0) - y).min(axis=1)
-    return inside, nearest

@@ -7,7 +7,7 @@ is asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,6 @@ from gyroid_cad.trim.nodes import part_nodes, rim_nodes
 from gyroid_cad.trim.paths import Ends, closed_paths, open_paths
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
-from gyroid_cad.wall.offset import Wall
 
 __all__ = ["cross_part"]
 
@@ -50,9 +49,8 @@ class _Link:
 
 
 def cross_part(
-    wall: Wall,
-    patches: Integers,
-    sides: Iterable[tuple[int, bool]],
+    faces: LatticeFaces,
+    backwards: Booleans,
     boundary: Boundary,
     cell_size: float,
     in_part: Callable[[Floats], Booleans],
@@ -64,11 +62,10 @@ def cross_part(
 
     Parameters
     ----------
-    wall : Wall
-    patches : ndarray of int, shape (patches,)
-        All that the boundary may cross.
-    sides : iterable of (int, bool)
-        Which faces of a patch bound the region, and whether against their normal.
+    faces : LatticeFaces
+        All that bound the region and that the boundary may cross.
+    backwards : ndarray of bool, shape (faces,)
+        Whether the region lies on the side that the normal of a face points to.
     boundary : Boundary
     cell_size : float
         In mm.
@@ -85,16 +82,11 @@ def cross_part(
     KernelError
         If the two only touch somewhere, so that it is in doubt what to keep.
     """
-    sides = list(sides)
-    faces = LatticeFaces(
-        wall, np.tile(patches, len(sides)), np.repeat([side for side, _ in sides], len(patches)).astype(np.int64)
-    )
-    backwards = np.repeat([back for _, back in sides], len(patches)).astype(bool)
     made = Crossing(faces, boundary, pairs_of(faces, boundary), backwards)
     # Steps that are told of: nodes of rims and of edges, and curves of so many parts of the pairs.
     parts = int(np.clip(len(made.pairs.face) // _PAIRS, 1, _MOST_PARTS))
     steps = iter(range(1, parts + 3))
-    work = _Work(made, wall, cell_size, parts, lambda: progress and progress(next(steps), parts + 2))
+    work = _Work(made, cell_size, parts, lambda: progress and progress(next(steps), parts + 2))
     work.cut_lattice(in_part)
     if in_region is not None:
         work.cut_boundary(in_region, outer)
@@ -143,14 +135,10 @@ def _curves_here(pairs: Pairs, ends: Ends, cell_size: float, first: int) -> tupl
 class _Work:
     """Nodes and curves found, and the vertices and edges made of them."""
 
-    def __init__(
-        self, made: Crossing, wall: Wall, cell_size: float, parts: int, step_done: Callable[[], object]
-    ) -> None:
+    def __init__(self, made: Crossing, cell_size: float, parts: int, step_done: Callable[[], object]) -> None:
         self.made = made
-        complex, faces, pairs = wall.complex, made.faces, made.pairs
-        self.rims = faces.side[:, None] * complex.edge_count + complex.patch_edges[faces.patch]
-        self.fans = faces.side[:, None] * complex.fan_count + complex.patch_fans[faces.patch]
-        self.forward = complex.edge_forward[faces.patch]
+        faces, pairs = made.faces, made.pairs
+        self.rims, self.fans, self.forward = faces.rims, faces.fans, faces.forward
         self.rim_nodes = rim_nodes(pairs, self.rims, self.forward)
         step_done()
         self.part_nodes = part_nodes(faces, made.boundary)

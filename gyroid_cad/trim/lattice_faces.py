@@ -12,12 +12,13 @@ from gyroid_cad.common.arrays import dot
 from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.nurbs.surface import edge_row, grid_points, point_derivatives
 from gyroid_cad.trim.boundary import Boundary
-from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.offset import SIDES, Wall, side_along
 
 __all__ = ["GRID", "LatticeFaces", "Pairs", "pairs_of"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 # Places along each side of the square at which faces are looked at, and how many faces at a time.
 GRID = 33
@@ -26,14 +27,16 @@ _AT_ONCE = 256
 
 @dataclass(frozen=True, eq=False)
 class LatticeFaces:
-    """Some faces of a wall.
+    """Some faces of a wall: sides of its patches, and walls where it ends.
+
+    Their borders are rims: edges of the complex on side 0, the same on side 1, then the posts through the wall at its
+    fans. Corners are known by fans on side 0, then on side 1.
 
     Attributes
     ----------
     wall : Wall
     patch, side : ndarray of int, shape (faces,)
-    nets : ndarray, shape (faces, n, n, 3)
-        In mm, in place.
+        Sides from 0 to 5, as of :class:`~gyroid_cad.wall.offset.Wall`.
     """
 
     wall: Wall
@@ -44,7 +47,53 @@ class LatticeFaces:
     def nets(self) -> Floats:
         """Control points in place, in mm; shape (faces, n, n, 3)."""
         shifts = self.wall.shifts[self.wall.patch_shift[self.patch]]
-        return np.asarray(self.wall.nets[self.wall.patch_net[self.patch], self.side] + shifts[:, None, None])
+        return np.asarray(self.wall.nets_of(self.wall.patch_net[self.patch], self.side) + shifts[:, None, None])
+
+    @cached_property
+    def rims(self) -> Integers:
+        """Number of the rim along each side of the square; shape (faces, 4)."""
+        complex = self.wall.complex
+        edge, (start, end) = complex.patch_edges[self._edge], self._fans
+        rims = self.side[:, None] * complex.edge_count + complex.patch_edges[self.patch]
+        through = len(SIDES) * complex.edge_count
+        own = np.stack([edge, through + end, complex.edge_count + edge, through + start], axis=1)
+        return np.where(self._ends, own, rims)
+
+    @cached_property
+    def forward(self) -> Booleans:
+        """Mask of the sides of the square that run the way the rim does; shape (faces, 4).
+
+        Those through the wall run from side 0 to side 1.
+        """
+        own = self.wall.complex.edge_forward[self._edge]
+        yes = np.ones(len(self), dtype=bool)
+        return np.where(
+            self._ends, np.stack([own, yes, ~own, ~yes], axis=1), self.wall.complex.edge_forward[self.patch]
+        )
+
+    @cached_property
+    def fans(self) -> Integers:
+        """Number of the fan at each corner of the square; shape (faces, 4)."""
+        count, (start, end) = self.wall.complex.fan_count, self._fans
+        fans = self.side[:, None] * count + self.wall.complex.patch_fans[self.patch]
+        return np.where(self._ends, np.stack([start, end, count + end, count + start], axis=1), fans)
+
+    @property
+    def _ends(self) -> Booleans:
+        """Mask of the walls where the lattice ends; shape (faces, 1)."""
+        return (self.side >= side_along(0))[:, None]
+
+    @property
+    def _edge(self) -> tuple[Integers, Integers]:
+        """Index of the edge that each of these runs along in arrays by patch and edge."""
+        return self.patch, np.maximum(self.side - side_along(0), 0)
+
+    @property
+    def _fans(self) -> tuple[Integers, Integers]:
+        """Fans at the beginning and at the end of that edge, as the patch runs."""
+        patch, edge = self._edge
+        fans = self.wall.complex.patch_fans
+        return fans[patch, edge], fans[patch, (edge + 1) % 4]
 
     def __len__(self) -> int:
         return len(self.patch)

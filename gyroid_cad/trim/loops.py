@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
 
-__all__ = ["contains", "decided", "linked", "nested", "signed_area"]
+__all__ = ["contains", "decided", "linked", "nested", "signed_area", "within_polygons"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
+
+# Places times sides that are looked at together.
+_AT_ONCE = 2**21
 
 
 class _Link(Protocol):
@@ -88,6 +91,30 @@ def contains(outline: Floats, place: Floats) -> bool:
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = x - y * (next_x - x) / (next_y - y) > 0
     return bool(np.sum(crosses & beyond) % 2)
+
+
+def within_polygons(places: Floats, start: Floats, end: Floats) -> tuple[Booleans, Floats]:
+    """Mask of places that lie in polygons by the crossings of a ray, and how far each is from the nearest side.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 2)
+    start, end : ndarray, shape (sides, 2)
+        Of all polygons' sides.
+    """
+    inside, nearest = np.zeros(len(places), dtype=bool), np.zeros(len(places))
+    (x0, y0), (x1, y1) = start.T, end.T
+    squared = np.maximum((x1 - x0) ** 2 + (y1 - y0) ** 2, np.finfo(float).tiny)
+    count = max(1, _AT_ONCE // len(start))
+    for first in range(0, len(places), count):
+        some = slice(first, first + count)
+        x, y = places[some, 0, np.newaxis], places[some, 1, np.newaxis]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            beyond = x0 + (y - y0) / (y1 - y0) * (x1 - x0) > x
+        inside[some] = np.count_nonzero(((y0 > y) != (y1 > y)) & beyond, axis=1) % 2 == 1
+        along = np.clip(((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / squared, 0, 1)
+        nearest[some] = np.hypot(x0 + along * (x1 - x0) - x, y0 + along * (y1 - y0) - y).min(axis=1)
+    return inside, nearest
 
 
 def decided(

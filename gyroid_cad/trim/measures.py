@@ -15,16 +15,17 @@ from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.free_surfaces import FreeForm, Swept
+from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve
 from gyroid_cad.trim.sections import on_section
 from gyroid_cad.trim.surfaces import PartSurface, Quadric
-from gyroid_cad.wall.offset import Wall
 
 __all__ = ["PieceMeasures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 _PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 64
 # Of a face of the part that is no plane, along each parameter.
@@ -54,15 +55,14 @@ def joined(*measures: PieceMeasures) -> PieceMeasures:
     return PieceMeasures(*(np.concatenate([getattr(some, name) for some in measures]) for name in ("flux", "area")))
 
 
-def whole_measures(wall: Wall, whole: list[tuple[int, int, bool]], middle: Floats) -> PieceMeasures:
-    """Measure whole faces of a wall, by patch and side, and whether they are used against their normal."""
-    if not whole:
+def whole_measures(faces: LatticeFaces, backwards: Booleans, middle: Floats) -> PieceMeasures:
+    """Measure whole faces of a wall; those used against their normal are told by a mask."""
+    if not len(faces):
         return PieceMeasures(np.zeros(0), np.zeros(0))
-    patch, side, backwards = (np.array(some) for some in zip(*whole, strict=True))
-    net = wall.patch_net[patch]
-    pairs, index = np.unique(np.stack([net, side]), axis=1, return_inverse=True)
-    sums = SquareQuadrature(wall.knots).over_square(wall.nets[pairs[0], pairs[1]], wall.weights)[index.ravel()]
-    shift = wall.shifts[wall.patch_shift[patch]] - middle
+    wall = faces.wall
+    pairs, index = np.unique(np.stack([wall.patch_net[faces.patch], faces.side]), axis=1, return_inverse=True)
+    sums = SquareQuadrature(wall.knots).over_square(wall.nets_of(*pairs), wall.weights)[index.ravel()]
+    shift = wall.shifts[wall.patch_shift[faces.patch]] - middle
     sign = np.where(backwards, -1.0, 1.0)
     return PieceMeasures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
 
@@ -81,7 +81,7 @@ def lattice_measures(cut: Crossing, middle: Floats) -> PieceMeasures:
     sums = np.zeros((len(face), 5))
     # Places come in the order of their nets, so that the samples of one are held at a time.
     for net, some in grouped(of_piece.ravel()[piece]):
-        density = quadrature.densities(wall.nets[None, nets[net, 0], nets[net, 1]], wall.weights)[0]
+        density = quadrature.densities(wall.nets_of(*nets[net, :, np.newaxis]), wall.weights)[0]
         for rows in np.split(some, range(_AT_ONCE, len(some), _AT_ONCE)):
             np.add.at(sums, piece[rows], quadrature.shares(places[rows], rates[rows], density))
     shift = wall.shifts[wall.patch_shift[faces.patch[face]]] - middle
@@ -111,8 +111,7 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
     section = np.array([one.kind == "section" for one in edges])
     turn = np.where(forward, 1.0, -1.0)
 
-    patch = cut.faces.patch[[cut.lattice[k].face for k in piece.tolist()]]
-    side, limits = _on_sides(cut, patch, edges)
+    side, limits = _on_sides(cut, np.array([cut.lattice[k].face for k in piece.tolist()]), edges)
     ends = np.stack(square_points(side[:, None], limits), axis=-1)
     rows = np.flatnonzero(section)
     curves = [cut.sections[edges[k].number].in_square for k in rows.tolist()]
@@ -140,12 +139,10 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
     return np.concatenate(places), np.concatenate(rates), np.concatenate(pieces)
 
 
-def _on_sides(cut: Crossing, patch: Integers, edges: list[CutEdge]) -> tuple[Integers, Floats]:
-    """Sides of patches that edges lie on where they are rims, and where those end along them, run round the square."""
-    complex = cut.faces.wall.complex
-    number = np.array([edge.number for edge in edges])
-    side = np.argmax(complex.patch_edges[patch] == (number % complex.edge_count)[:, None], axis=1)
-    sign = np.where(complex.edge_forward[patch, side], 1.0, -1.0)
+def _on_sides(cut: Crossing, face: Integers, edges: list[CutEdge]) -> tuple[Integers, Floats]:
+    """Sides of the square that edges lie on where they are rims, and where those end along them, run round it."""
+    side = np.argmax(cut.faces.rims[face] == np.array([edge.number for edge in edges])[:, None], axis=1)
+    sign = np.where(cut.faces.forward[face, side], 1.0, -1.0)
     return side, sign[:, None] * np.array([(edge.first, edge.last) for edge in edges])
 
 

@@ -182,10 +182,12 @@ def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
     KernelError
         If an edge only touches a face, or crosses it at its rim.
     """
-    edge, low, high, start, end = _segments(boundary, faces.size)
     integers, numbers = np.zeros(0, dtype=np.int64), np.zeros(0)
     none = PartNodes(integers, integers, numbers, numbers > 0, np.zeros((0, 2)), np.zeros((0, 3)))
-    if not len(edge) or not len(faces):
+    if not len(faces):
+        return none
+    edge, low, high, start, end = _segments(boundary, faces.size)
+    if not len(edge):
         return none
     face, segment = _near(faces, start, end)
     if not len(face):
@@ -201,7 +203,7 @@ def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats
     for number, one in enumerate(boundary.edges):
         if one.curve is None:
             continue
-        points, rates, *_ = one.curve(np.linspace(one.first, one.last, 33))
+        points, rates, *_ = one.curve(np.linspace(one.first, one.last, 2 if one.straight else 33))
         length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
         along = rates / np.maximum(np.linalg.norm(rates, axis=1, keepdims=True), np.finfo(float).tiny)
         turn = np.linalg.norm(np.diff(along, axis=0), axis=1).sum()

@@ -30,7 +30,7 @@ class CutEdge:
         Parameters of its curve there.
     kind : {"rim", "part", "section"}
     number : int
-        Of the rim (those of side 1 after those of side 0), of the part's edge, or of the section curve.
+        Of the rim, of the part's edge, or of the section curve.
     """
 
     start: int
@@ -74,7 +74,7 @@ class Crossing:
     points : list of ndarray, shape (3,)
         Vertices; the first are the part's own.
     fans : dict
-        Vertices at corners of the wall's faces, by their fans; those of side 1 after those of side 0.
+        Vertices at corners of the wall's faces, by the numbers of their fans.
     edges : list of CutEdge
     sections : list of SectionCurve
     lattice : list of CutLoops

@@ -187,7 +187,7 @@ def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) ->
     stations = stations.copy()
     stations[:, [0, -1]] = ends
     points = np.zeros((*stations.shape[:2], 3))
-    ranges = np.array([np.ptp(face.range, axis=0) for face in pairs.boundary.faces])[pairs.part[pair]]
+    ranges = pairs.boundary.spans[pairs.part[pair]]
     left = np.arange(len(pair))
     for _ in range(_NEWTON_STEPS):
         some = stations[left]

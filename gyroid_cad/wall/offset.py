@@ -2,7 +2,9 @@
 
 Everything downstream (solid, meshes, volumes) reads these nets; nothing derives the surface again. Side
 0 is the face on the far side of the common normal, side 1 the one it points to. On both, du x dv points
-along the common normal, for a placement that exchanges the sides also turns the patch over.
+along the common normal, for a placement that exchanges the sides also turns the patch over. Sides 2 to 5 are
+the walls through the lattice along a patch's edges 0 to 3, from side 0 to side 1; on them du x dv points out
+of the patch.
 """
 
 from __future__ import annotations
@@ -14,17 +16,20 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import freeze_arrays
 from gyroid_cad.errors import ParameterError
+from gyroid_cad.nurbs.basis import greville
 from gyroid_cad.nurbs.surface import NurbsSurface, edge_row, grid_derivatives, layer_volumes
 from gyroid_cad.surface.fit import FittedPatch, max_offset, require_shared_edges
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex
 
-__all__ = ["SIDES", "Wall", "build_wall"]
+__all__ = ["SIDES", "Wall", "build_wall", "side_along"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SIDES = (0, 1)
+# Through a straight line from -1 to 1, in the parameter that runs from side 0 to side 1.
+_ACROSS = np.array([-1.0, -1.0, 1.0, 1.0])
 # So few that what is computed for them stays in the processor's cache.
 _NETS_AT_ONCE = 64
 
@@ -66,11 +71,34 @@ class Wall:
     def side_wall(self, net: int, edge: int) -> NurbsSurface:
         """The ruled surface through the wall along edge ``edge``, from side 0 to side 1.
 
-        u runs along the edge as the patch does, v from 0 to 1 across; du x dv points out of the patch.
+        u runs along the edge as the patch does, v from -1 to 1 across; du x dv points out of the patch.
         """
         rows = np.stack([edge_row(self.nets[net, side], edge) for side in SIDES], axis=1)
         weights = np.repeat(edge_row(self.weights, edge)[:, np.newaxis], 2, axis=1)
-        return NurbsSurface(rows, weights, self.knots, np.array([0.0, 0.0, 1.0, 1.0]))
+        return NurbsSurface(rows, weights, self.knots, _ACROSS)
+
+    def nets_of(self, net: Integers, side: Integers) -> Floats:
+        """Control points of sides of distinct patches, each in the basis that the faces have.
+
+        A side wall is linear across: its net lies evenly between both rims, at Greville's abscissae. Of weights it
+        knows none, as walls that end somewhere have none.
+
+        Parameters
+        ----------
+        net, side : ndarray of int, shape (m,)
+            Sides from 0 to 5.
+
+        Returns
+        -------
+        ndarray, shape (m, n, n, 3)
+        """
+        made = self.nets[net, np.minimum(side, SIDES[1])]
+        share = ((greville(self.knots, 3) + 1) / 2)[:, np.newaxis]
+        for edge in range(4):
+            some = np.flatnonzero(side == side_along(edge))
+            low, high = (edge_row(np.moveaxis(self.nets[net[some], face], 0, 2), edge) for face in SIDES)
+            made[some] = np.moveaxis((1 - share) * low[:, :, np.newaxis] + share * high[:, :, np.newaxis], 1, 0)
+        return made
 
     def volume(self, patches: Integers | None = None) -> float:
         """Volume in mm3 of the wall, or of some of its patches, by Gauss quadrature of the Jacobian determinant.
@@ -112,6 +140,17 @@ class Wall:
                 known[net] = min(towards * _extreme(self.face(net, side), axis, towards) for side in SIDES)
             furthest = min(furthest, known[net] + towards * float(self.shifts[self.patch_shift[patch], axis]))
         return furthest
+
+
+def side_along(edge: int) -> int:
+    """Number of the side that is the wall along an edge of a patch.
+
+    Examples
+    --------
+    >>> [side_along(edge) for edge in range(4)]
+    [2, 3, 4, 5]
+    """
+    return len(SIDES) + edge
 
 
 def build_wall(complex: CellComplex, patch: FittedPatch, cell_size: float, thickness: float) -> Wall:

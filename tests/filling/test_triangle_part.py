@@ -97,6 +97,14 @@ def test_an_open_file_is_refused_with_its_holes_and_taken_if_it_may_be_repaired(
         triangle_part(tmp_path / "empty.stl", (), 0.1)
 
 
+def test_thin_curved_parts_lose_next_to_nothing_of_their_volume_if_they_are_meshed_closely() -> None:
+    tube = cq.Workplane().circle(10).circle(9.6).extrude(20)
+    volume = tube.val().Volume()
+    coarse, close = (triangle_part(tube, (), 0.3, closely=closely).body.volume for closely in (False, True))
+    assert abs(coarse / volume - 1) > 0.01
+    assert close == pytest.approx(volume, rel=3e-4)
+
+
 def test_films_that_chords_leave_between_solids_that_touch_are_no_voids() -> None:
     plate = cq.Workplane().box(20, 20, 8).faces(">Z").workplane().cboreHole(6.0, 11.0, 4.0)
     bolt = cq.Workplane().circle(3.0).extrude(4.0).faces(">Z").workplane().circle(5.5).extrude(4.0)

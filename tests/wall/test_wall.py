@@ -113,7 +113,7 @@ def test_side_walls_close_each_patch_and_point_out_of_it(net: int) -> None:
     middle = np.mean([wall.face(net, side).evaluate(0, 0) for side in SIDES], axis=0)
     for k in range(4):
         side_wall = wall.side_wall(net, k)
-        u, v = np.linspace(-1, 1, 9)[:, np.newaxis], np.linspace(0, 1, 3)
+        u, v = np.linspace(-1, 1, 9)[:, np.newaxis], np.linspace(-1, 1, 3)
         outwards = np.sum(side_wall.normals(u, v) * (side_wall.evaluate(u, v) - middle), axis=-1)
         assert np.all(outwards > 0)
 
@@ -124,7 +124,8 @@ def test_side_walls_join_the_borders_of_both_faces() -> None:
     for k in range(4):
         for side in SIDES:
             border = wall.face(3, side).edge(k).evaluate(along)
-            np.testing.assert_allclose(wall.side_wall(3, k).evaluate(along, float(side)), border, rtol=0, atol=1e-13)
+            across = 2.0 * side - 1
+            np.testing.assert_allclose(wall.side_wall(3, k).evaluate(along, across), border, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("cells", [*BLOCKS, (2, 2, 2)])

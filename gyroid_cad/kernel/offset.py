@@ -272,9 +272,7 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
     ways = _ways_for(solid, openings)
     if (pairs := room.crossing_pairs()) > _MOST_PAIRS:
         ways = [way for way in ways if way not in _OF_PIECES]
-        reasons.append(
-            f"{pairs} pairs of its free-form faces are so near that their offsets may cross, which is too slow"
-        )
+        reasons.append(f"{pairs} pairs of its free-form faces are so near that their offsets may cross: too many")
     if core := _confirmed(solid, openings, skin, depths, ways, reasons):
         # What goes on from here is the same at every run.
         ordered = sorted_by_place(map(in_order, core))
@@ -305,11 +303,12 @@ def _confirmed(
 def _folding(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> str:
     """Thickness below which no offset of a face folds, where one does with that which was asked for."""
     faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
-    folding = [
-        (number, *FaceOffset(face, 0.0, skin).folding())
+    offsets_of = [
+        (number, FaceOffset(face, 0.0, skin))
         for number, face in enumerate(faces, 1)
         if not any(face.IsSame(opening) for opening in openings)
     ]
+    folding = [(number, *offset.folding()) for number, offset in offsets_of if offset.may_fold(skin)]
     found, most = "", skin
     while narrow := [one for one in folding if one[1] < most < one[2] * (1 - _SAME_RADIUS)]:
         number, most, _, place = min(narrow, key=lambda one: one[1])

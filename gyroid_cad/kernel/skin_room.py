@@ -56,7 +56,8 @@ class FaceRoom:
     place: Floats
 
     def __str__(self) -> str:
-        return f"face {self.number} has the least room, about {self.radius:.2g} mm at {shown_place(self.place)}"
+        where = f"face {self.number} has room for at {shown_place(self.place)}"
+        return f"each face keeps an inner side below about {self.radius:.2g} mm, the least, which {where}"
 
 
 class SkinRoom:

@@ -28,7 +28,7 @@ __all__ = ["FaceRoom", "SkinRoom", "shown_place"]
 Floats = NDArray[np.float64]
 
 # Places on a face where balls are tried, and how often their radii are halved.
-_PLACES, _HALVINGS = 48, 12
+_PLACES, _HALVINGS = 96, 12
 # A ball may be so much larger than the room for it, in parts of it: triangles have chords.
 _AS_LARGE = 0.98
 # Of triangles, in parts of a skin and of the solid's extent, as distances are measured by.

@@ -46,6 +46,7 @@ __all__ = [
     "selected_faces",
     "selected_way",
     "sound_part",
+    "triangles_by_face",
     "triangles_of",
 ]
 
@@ -193,10 +194,18 @@ class Part:
 
 def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
     """Corners of triangles no further from a shape's faces than a deflection in mm; shape (triangles, 3, 3)."""
+    return np.concatenate([np.empty((0, 3, 3)), *triangles_by_face(shape, deflection)])
+
+
+def triangles_by_face(shape: TopoDS_Shape, deflection: float) -> list[Floats]:
+    """Corners of triangles as of :func:`triangles_of`, those of each face by themselves."""
     copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
     # In one thread, so that a process may be forked from this one.
     BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
-    return np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(copy))])
+    return [
+        np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(face))])
+        for face in parts_of(copy, TopAbs_FACE)
+    ]
 
 
 def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:

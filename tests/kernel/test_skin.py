@@ -264,8 +264,19 @@ def test_a_refusal_names_the_face_that_is_bent_too_narrowly_and_what_can_be_made
     monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", lambda *arguments: (None for _ in CLOSED_WAYS))
     with pytest.raises(KernelError, match=r"below 1\.5\d* mm no offset folds .* face \d is bent at \("):
         hollow(require_part(wrapped(prism)), 2.0)
-    with pytest.raises(KernelError, match="by 1 mm; another thickness may do"):
+    with pytest.raises(
+        KernelError, match=r"by 1 mm; each face .* below about 2 mm, .* face \d .* at \(.*core=, --core"
+    ):
         hollow(require_part(wrapped(prism)), 1.0)
+
+
+def test_what_fails_is_tried_once_more_within_the_room_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    def thin_ones(solid: TopoDS_Solid, openings: Any, skin: float, *more: Any) -> Iterator[TopoDS_Shape | None]:
+        yield wrapped(box(*(side - 2 * skin for side in SIDES))) if skin <= 0.5 else None
+
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "offsets", thin_ones)
+    with pytest.raises(KernelError, match=r"cannot offset the part by 1 mm.*; 0\.5 mm was tried and can be made"):
+        parted(box())
 
 
 def crashes(*arguments: str) -> None:

@@ -183,8 +183,8 @@ class Depths:
             self._near[skin] = NearDistances(self.kept.faces, skin)
         return self._near[skin](points, times * skin)
 
-    def deepest(self, enough: float) -> float:
-        """About how deep the deepest place lies, in mm; or how deep one does that is well deeper than is enough."""
+    def deepest(self, enough: float) -> tuple[float, Floats]:
+        """About how deep the deepest place lies, in mm, and which it is, shape (3,); or one well deeper than enough."""
         points = self._inside
         depths = self._depths(points, enough)
         for reach in _REACH * 0.5 ** np.arange(_ROUNDS):
@@ -196,7 +196,9 @@ class Depths:
             tried = tried[self._solid.contains(tried)]
             points = np.concatenate([points[best], tried])
             depths = np.concatenate([depths[best], self._depths(tried, enough)])
-        return float(depths.max(initial=0.0))
+        if not len(depths):
+            return 0.0, (self._solid.low + self._solid.high) / 2
+        return float(depths.max()), points[int(np.argmax(depths))]
 
     def confirm(self, core: Sequence[TopoDS_Solid], skin: float) -> bool:
         """Confirm that solids are closed, valid, and what a skin leaves of this one, as far as points tell."""

@@ -48,9 +48,10 @@ Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 
 _TOLERANCE = 1e-5
 # The kernel's own ways are quick where they work at all; those that are not crash or do not end.
-_SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _LEAST_SECONDS, _SECONDS_BETWEEN_LOOKS = 60.0, 5.0, 0.5, 0.02
+_SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _LEAST_SECONDS, _SECONDS_BETWEEN_LOOKS = 30.0, 5.0, 0.5, 0.02
 # More pairs of free-form offsets that may meet are not cut against each other: a pair takes the kernel about a second.
-_MOST_PAIRS = 60
+# Its own ways, which take no pieces, are then given less time each.
+_MOST_PAIRS, _SECONDS_OF_MANY = 60, 2.5
 # A thickness that is tried where another failed, in parts of the room that the tightest face leaves and of what failed.
 _WITHIN_ROOM, _THINNER, _SECONDS_THINNER = 0.9, 0.5, 4.0
 _OF_PIECES = _PIECES, _PIECES_TO_OPENINGS = "pieces", "pieces to openings"
@@ -269,11 +270,11 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
     """
     reasons: list[str] = []
     room = SkinRoom(solid, openings, skin)
-    ways = _ways_for(solid, openings)
+    ways, seconds = _ways_for(solid, openings), np.inf
     if (pairs := room.crossing_pairs()) > _MOST_PAIRS:
-        ways = [way for way in ways if way not in _OF_PIECES]
+        ways, seconds = [way for way in ways if way not in _OF_PIECES], _SECONDS_OF_MANY
         reasons.append(f"{pairs} pairs of its free-form faces are so near that their offsets may cross: too many")
-    if core := _confirmed(solid, openings, skin, depths, ways, reasons):
+    if core := _confirmed(solid, openings, skin, depths, ways, reasons, seconds):
         # What goes on from here is the same at every run.
         ordered = sorted_by_place(map(in_order, core))
         return ordered if all(is_valid(one) and topology(one).closed for one in ordered) else core

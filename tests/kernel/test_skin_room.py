@@ -15,7 +15,7 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.kernel.offset import OPEN_WAYS
 from gyroid_cad.kernel.part import Part, require_part
-from gyroid_cad.kernel.skin import hollow
+from gyroid_cad.kernel.skin import hollow, hollow_round
 from gyroid_cad.kernel.skin_room import SkinRoom
 
 
@@ -86,3 +86,9 @@ def test_too_many_that_may_cross_are_not_cut_and_the_refusal_names_place_thickne
     assert time.process_time() - start < 5
     assert not any("pieces" in way for way in tried)
     assert any("pieces" in way for way in OPEN_WAYS)
+
+
+def test_a_core_of_the_users_own_leaves_a_skin_where_none_can_be_made() -> None:
+    made = hollow_round(part_of(waved(36)), part_of(bd.Pos(0, 0, 3) * bd.Cylinder(5, 4)))
+    assert made.thickness == pytest.approx(1.0)
+    assert made.core.volume == pytest.approx(np.pi * 5**2 * 4)

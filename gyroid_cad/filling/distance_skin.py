@@ -19,6 +19,7 @@ from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.triangle_part import TrianglePart, triangle_part
 from gyroid_cad.kernel.part import AS_FAR, ON_FACE, OPENINGS, selected_way
+from gyroid_cad.kernel.skin_room import shown_place
 from gyroid_cad.mesh.triangles.booleans import Body, body_of
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.level_set import Grid, level_surface, told_apart
@@ -174,7 +175,10 @@ def _thinner(part: TrianglePart) -> str:
     """Thickness of skin that leaves a core, by the depths of points of a grid."""
     along = [np.linspace(low, high, 42)[1:-1] for low, high in zip(part.low, part.high, strict=True)]
     points = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
-    return f"below about {-float(part.distances(points).min()):.3g} mm, where nothing is left to be filled"
+    depths = -part.distances(points)
+    deepest = int(np.argmax(depths))
+    where = f"its deepest place, round {shown_place(points[deepest])}"
+    return f"below about {depths[deepest]:.3g} mm, the depth of {where}: nothing is left to be filled"
 
 
 def given_core(part: TrianglePart, core: Any, deviation: float) -> tuple[Body, float | None]:

@@ -1,4 +1,4 @@
-"""Boxes: round shapes, a quick one for searching and the tightest one, and the one that a solid is."""
+"""Boxes round shapes, quick ones for searching and the tightest, the one that a solid is; and what faces are on."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
-from OCP.GeomAbs import GeomAbs_Plane
+from OCP.GeomAbs import GeomAbs_Cone, GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere, GeomAbs_Torus
 from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp
-from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_vertex
 from gyroid_cad.trim.box import Box
 
-__all__ = ["bounding_box", "box_of", "box_round", "corners_of"]
+__all__ = ["bounding_box", "box_of", "box_round", "corners_of", "free_form_faces"]
 
 _BOX_FACES, _BOX_CORNERS = 6, 8
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
+_IN_CLOSED_FORM = {GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus}
 
 
 def box_round(shapes: Iterable[TopoDS_Shape]) -> Bnd_Box:
@@ -72,3 +73,9 @@ def box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:
     ends = np.minimum(np.abs(along - low), np.abs(along - high))
     upper = {tuple(row) for row in (along > (low + high) / 2).tolist()}
     return Box(axes, low, high) if ends.max() < _SQUARE * size and len(upper) == _BOX_CORNERS else None
+
+
+def free_form_faces(shape: TopoDS_Shape) -> list[TopoDS_Face]:
+    """Faces on surfaces that have no closed form: splines, and what is swept or offset."""
+    faces = map(as_face, parts_of(shape, TopAbs_FACE))
+    return [face for face in faces if BRepAdaptor_Surface(face, False).GetType() not in _IN_CLOSED_FORM]

@@ -40,6 +40,7 @@ from gyroid_cad.kernel.depth import Depths, FaceDistances
 from gyroid_cad.kernel.offset_surface import FaceOffset
 from gyroid_cad.kernel.ordered import in_order, sorted_by_place
 from gyroid_cad.kernel.sieve import OpenSkinError, core_of_pieces
+from gyroid_cad.kernel.skin_room import SkinRoom, shown_place
 
 __all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
 
@@ -47,7 +48,12 @@ Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 
 _TOLERANCE = 1e-5
 # The kernel's own ways are quick where they work at all; those that are not crash or do not end.
-_SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _SECONDS_BETWEEN_LOOKS = 60.0, 5.0, 0.02
+_SECONDS_AT_MOST, _SECONDS_OF_KERNEL, _LEAST_SECONDS, _SECONDS_BETWEEN_LOOKS = 30.0, 5.0, 0.5, 0.02
+# More pairs of free-form offsets that may meet are not cut against each other: a pair takes the kernel about a second.
+# Its own ways, which take no pieces, are then given less time each.
+_MOST_PAIRS, _SECONDS_OF_MANY = 60, 2.5
+# A thickness that is tried where another failed, in parts of the room that the tightest face leaves and of what failed.
+_WITHIN_ROOM, _THINNER, _SECONDS_THINNER = 0.9, 0.5, 4.0
 _OF_PIECES = _PIECES, _PIECES_TO_OPENINGS = "pieces", "pieces to openings"
 # Faces that are bent alike all over, to rounding, do not fold: they vanish.
 _SAME_RADIUS = 1e-3
@@ -60,6 +66,7 @@ def offsets(
     skin: float,
     ways: Sequence[str],
     reasons: list[str] | None = None,
+    seconds: float = np.inf,
 ) -> Generator[TopoDS_Shape | None]:
     """Solids that each way of offsetting leaves inside a skin; None where one fails, crashes or does not end.
 
@@ -74,15 +81,24 @@ def offsets(
         Of ``OPEN_WAYS`` and ``CLOSED_WAYS``.
     reasons : list of str, optional
         To which is added why a way failed, where it says so.
+    seconds : float
+        That one way may take at most, if that is less than it usually may.
     """
     numbers = [k for k, face in enumerate(parts_of(solid, TopAbs_FACE)) if any(face.IsSame(one) for one in openings)]
     with TemporaryDirectory() as folder:
         BinTools.Write_s(solid, str(Path(folder, _SOLID)))
-        left = list(ways)
+        left, ends = list(ways), time.monotonic() + _SECONDS_OF_KERNEL
         while left:
             process = started(work, folder, repr(skin), ",".join(map(str, numbers)), *left)
             try:
-                while left and (found := _awaited(process, Path(folder, left[0]))):
+                while left:
+                    begun, of_kernel = time.monotonic(), left[0] not in _OF_PIECES
+                    at_most = max(_LEAST_SECONDS, ends - begun) if of_kernel else _SECONDS_AT_MOST
+                    found = _awaited(process, Path(folder, left[0]), min(at_most, seconds, _SECONDS_AT_MOST))
+                    # All of the kernel's own ways together may take so long.
+                    ends += 0.0 if of_kernel else time.monotonic() - begun
+                    if found is None:
+                        break
                     left.pop(0)
                     yield _read(found) if found.stat().st_size else None
                 if left and left[0] in _OF_PIECES and reasons is not None and process.wait(0) is None:
@@ -96,9 +112,8 @@ def offsets(
             reasons.append(Path(folder, _REASON).read_text(encoding="utf-8"))
 
 
-def _awaited(process: Started, path: Path) -> Path | None:
-    """The path once there is a file; None if the process ends before, or takes too long."""
-    at_most = _SECONDS_AT_MOST if path.name in _OF_PIECES else min(_SECONDS_OF_KERNEL, _SECONDS_AT_MOST)
+def _awaited(process: Started, path: Path, at_most: float) -> Path | None:
+    """The path once there is a file; None if the process ends before, or takes too many seconds."""
     end = time.monotonic() + at_most
     while not path.exists():
         ended = process.wait(_SECONDS_BETWEEN_LOOKS) is not None
@@ -254,45 +269,74 @@ def core_of(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, d
         If none of the kernel's ways to offset gives a core whose points lie as deep as they should.
     """
     reasons: list[str] = []
-    with closing(_attempts(solid, openings, skin, reasons)) as attempts:
-        for core in attempts:
-            if depths.confirm(core, skin):
-                # What goes on from here is the same at every run.
-                ordered = sorted_by_place(map(in_order, core))
-                return ordered if all(is_valid(one) and topology(one).closed for one in ordered) else core
+    room = SkinRoom(solid, openings, skin)
+    ways, seconds = _ways_for(solid, openings), np.inf
+    if (pairs := room.crossing_pairs()) > _MOST_PAIRS:
+        ways, seconds = [way for way in ways if way not in _OF_PIECES], _SECONDS_OF_MANY
+        reasons.append(f"{pairs} pairs of its free-form faces are so near that their offsets may cross: too many")
+    if core := _confirmed(solid, openings, skin, depths, ways, reasons, seconds):
+        # What goes on from here is the same at every run.
+        ordered = sorted_by_place(map(in_order, core))
+        return ordered if all(is_valid(one) and topology(one).closed for one in ordered) else core
     why = "".join(f": {reason}" for reason in reasons[:1])
-    remedy = "a core of your own (core) does, and without a skin it can still be filled"
-    raise KernelError(
-        f"the kernel cannot offset the part by {skin:g} mm{why}; {_possible(solid, openings, skin)}{remedy}"
-    )
+    tightest, folding = room.tightest(), _folding(solid, openings, skin)
+    thinner = float(f"{min(_WITHIN_ROOM * tightest.radius, _THINNER * skin):.2g}")
+    made = pairs <= _MOST_PAIRS and _confirmed(solid, openings, thinner, depths, ways, [], _SECONDS_THINNER)
+    limits = f"{folding}{tightest}; {f'{thinner:g} mm was tried and can be made; ' if made else ''}"
+    remedy = "a core of your own (core=, --core) does, and without a skin it can still be filled"
+    raise KernelError(f"the kernel cannot offset the part by {skin:g} mm{why}; {limits}{remedy}")
 
 
-def _possible(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> str:
+def _confirmed(
+    solid: TopoDS_Solid,
+    openings: Sequence[TopoDS_Face],
+    skin: float,
+    depths: Depths,
+    ways: Sequence[str],
+    reasons: list[str],
+    seconds: float = np.inf,
+) -> list[TopoDS_Solid]:
+    """The first core that lies as deep as it should; none if there is no such."""
+    with closing(_attempts(solid, openings, skin, ways, reasons, seconds)) as attempts:
+        return next((core for core in attempts if depths.confirm(core, skin)), [])
+
+
+def _folding(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float) -> str:
     """Thickness below which no offset of a face folds, where one does with that which was asked for."""
     faces = [as_face(face) for face in parts_of(solid, TopAbs_FACE)]
-    folding = [
-        (number, *FaceOffset(face, 0.0, skin).folding())
+    offsets_of = [
+        (number, FaceOffset(face, 0.0, skin))
         for number, face in enumerate(faces, 1)
         if not any(face.IsSame(opening) for opening in openings)
     ]
-    found, most = "another thickness may do, ", skin
+    folding = [(number, *offset.folding()) for number, offset in offsets_of if offset.may_fold(skin)]
+    found, most = "", skin
     while narrow := [one for one in folding if one[1] < most < one[2] * (1 - _SAME_RADIUS)]:
         number, most, _, place = min(narrow, key=lambda one: one[1])
-        where = ", ".join(f"{round(x, 3) + 0.0:g}" for x in place.tolist())
-        found = f"below {most:.3g} mm no offset folds over, a radius to which face {number} is bent at ({where}); "
+        bent = f"a radius to which face {number} is bent at {shown_place(place)}"
+        found = f"below {most:.3g} mm no offset folds over, {bent}; "
     return found
 
 
+def _ways_for(solid: TopoDS_Solid, openings: Sequence[TopoDS_Face]) -> list[str]:
+    """Ways to offset a solid, in the order in which they are tried."""
+    if not openings:
+        return list(CLOSED_WAYS)
+    # Of solids with voids the kernel's own ways offset one shell alone.
+    voids = sum(1 for _ in parts_of(solid, TopAbs_SHELL)) > 1
+    return [_PIECES_TO_OPENINGS, *CLOSED_WAYS] if voids else [*OPEN_WAYS, *CLOSED_WAYS]
+
+
 def _attempts(
-    solid: TopoDS_Solid, openings: Sequence[TopoDS_Face], skin: float, reasons: list[str]
+    solid: TopoDS_Solid,
+    openings: Sequence[TopoDS_Face],
+    skin: float,
+    ways: Sequence[str],
+    reasons: list[str],
+    seconds: float,
 ) -> Generator[list[TopoDS_Solid]]:
-    ways = list(CLOSED_WAYS)
-    if openings:
-        # Of solids with voids the kernel's own ways offset one shell alone.
-        voids = sum(1 for _ in parts_of(solid, TopAbs_SHELL)) > 1
-        ways = [_PIECES_TO_OPENINGS, *ways] if voids else [*OPEN_WAYS, *ways]
-    with closing(offsets(solid, openings, skin, ways, reasons)) as found:
-        for way, core in zip(ways, found, strict=True):
+    with closing(offsets(solid, openings, skin, ways, reasons, seconds)) as found:
+        for way, core in zip(ways, found, strict=False):
             if core is not None:
                 yield _solids_in(_opened(core, openings, skin) if way in CLOSED_WAYS else core)
 

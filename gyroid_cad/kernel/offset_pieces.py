@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.Geom import Geom_Circle, Geom_Line
+from OCP.Geom import Geom_Circle, Geom_Line, Geom_Surface
 from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
 from OCP.gp import gp_Ax2, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
@@ -42,8 +42,8 @@ from gyroid_cad.kernel.offset_surface import (
     plane_points,
     vector_of,
 )
-from gyroid_cad.kernel.offset_tube import BallArc, ball_round, tube_round
-from gyroid_cad.kernel.spline_fit import fitted_curve, fitted_plane_curve
+from gyroid_cad.kernel.offset_tube import BallArc, ball_round, straight, tube_round
+from gyroid_cad.kernel.spline_fit import fitted_curve
 
 __all__ = ["offset_pieces"]
 
@@ -54,7 +54,6 @@ _TOLERANCE = 1e-4
 # Sine of an angle between normals on either side of an edge below which the edge is smooth.
 _SMOOTH = 5e-3
 _SAMPLES = 9
-_SAME = 1e-12
 _LEAST_TOLERANCE = 1e-7
 # Number of a face that stands for both on either side of a smooth edge.
 _SHARED = -1
@@ -293,18 +292,18 @@ class _Pieces:
         curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
         ways = [partial(self._inwards, side) for side in sides]
         tube = tube_round(curve, ways[0], ways[1], self.by, self.tolerance)
-        made, wire, off = TopoDS_Face(), TopoDS_Wire(), _MARGIN * self.tolerance
+        made, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(made, tube.surface, self.place, _LEAST_TOLERANCE)
         self.builder.MakeWire(wire)
         borders = [self._edge(number, side.face) for side in sides]
         for border, across in zip(borders, (0.0, 1.0), strict=True):
-            line = _straight(tube.place(across, first), tube.place(across, last), first, last)
-            self.builder.UpdateEdge(border, line, tube.surface, self.place, off)
+            line = straight(tube.place(across, first), tube.place(across, last), first, last)
+            self._lay(border, [line], tube.surface)
         (low, low_backwards), (high, high_backwards) = arcs = [
             self._arc(number, at, parameter) for at, parameter in ((0, first), (-1, last))
         ]
         lines = [
-            _straight(tube.place(float(backwards), at), tube.place(1.0 - backwards, at), 0.0, arc.angle)
+            straight(tube.place(float(backwards), at), tube.place(1.0 - backwards, at), 0.0, arc.angle)
             for (arc, backwards), at in zip(arcs, (first, last), strict=True)
         ]
         # Anticlockwise in the plane of (across, along), and the other way where the surface's parameters run so.
@@ -313,11 +312,10 @@ class _Pieces:
         turned = float(np.linalg.det([beside - origin, beyond - origin])) < 0
         if low is high:
             # Of a seam the curve of the edge as it runs forwards comes first.
-            lines = lines if low_backwards == turned else lines[::-1]
-            self.builder.UpdateEdge(low.edge, *lines, tube.surface, self.place, off)
+            self._lay(low.edge, lines if low_backwards == turned else lines[::-1], tube.surface)
         else:
             for (arc, _), line in zip(arcs, lines, strict=True):
-                self.builder.UpdateEdge(arc.edge, line, tube.surface, self.place, off)
+                self._lay(arc.edge, [line], tube.surface)
         loop = [
             (low.edge, low_backwards),
             (borders[1], False),
@@ -332,6 +330,19 @@ class _Pieces:
         towards = curve_points(curve, np.array([middle]))[0] - point
         outwards = float(np.cross(along_u, along_v) @ towards) > 0
         return as_face(made.Oriented(TopAbs_FORWARD if outwards else TopAbs_REVERSED))
+
+    def _lay(self, edge: TopoDS_Edge, lines: Sequence[Geom2d_Curve], surface: Geom_Surface) -> None:
+        """Have an edge lie on a surface, along one line or as its seam, as near to it as it is."""
+        curve, off = BRepAdaptor_Curve(edge), self.tolerance
+        if not BRep_Tool.Degenerated_s(edge):
+            # Both are fits: together they may be apart by more than either of them.
+            parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), _CLOSELY)
+            on_lines = [derivatives(surface, plane_points(line, parameters))[0] for line in lines]
+            away = on_lines - curve_points(curve, parameters)
+            off = max(off, float(np.linalg.norm(away, axis=-1).max()))
+        self.builder.UpdateEdge(edge, *lines, surface, self.place, _MARGIN * off)
+        for end in parts_of(edge, TopAbs_VERTEX):
+            self.builder.UpdateVertex(as_vertex(end), _MARGIN * off)
 
     def _inwards(self, side: _Side, parameters: Floats) -> Floats:
         return -self.offsets[side.face].normals(plane_points(side.curve, parameters))
@@ -377,17 +388,6 @@ class _Pieces:
                 loop.append(following[0])
                 end = next(corner for corner in following[0].corners if corner != end)
             yield ball_round(loop, self.by, self.tolerance)
-
-
-def _straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_Curve:
-    """The straight line from a place to another between two parameters."""
-    way, length = stop - start, float(np.linalg.norm(stop - start))
-    if abs(length - (last - first)) < _SAME * (last - first):
-        origin = start - way / length * first
-        return Geom2d_Line(gp_Pnt2d(*origin.tolist()), gp_Dir2d(*way.tolist()))
-    return fitted_plane_curve(
-        lambda parameters: start + np.outer((parameters - first) / (last - first), way), [first, last], _SAME
-    )
 
 
 def _sign(offset: FaceOffset, edge: TopoDS_Edge) -> float:

@@ -14,9 +14,12 @@ from OCP.Geom import (
     Geom_BSplineSurface,
     Geom_Circle,
     Geom_Curve,
+    Geom_CylindricalSurface,
     Geom_Line,
     Geom_OffsetSurface,
+    Geom_Plane,
     Geom_RectangularTrimmedSurface,
+    Geom_SphericalSurface,
     Geom_Surface,
 )
 from OCP.Geom2d import Geom2d_Curve
@@ -50,6 +53,8 @@ _POLE, _BESIDE = 1e-7, 1e-6
 # By how much an offset's lengths shrink where a face is bent: at 0 it has an edge, below it turns inside out.
 _LEAST_STRETCH = 1e-4
 _SAMPLES, _CLOSELY, _STEP = 9, 21, 1e-5
+# An offset may fold if it is so wide, in parts of the least radius that a face has at a few places.
+_BENT = 0.25
 # The place where a face is bent most is sought in ever smaller grids.
 _ZOOMS, _ROUND, _BORDER = 8, np.linspace(-1, 1, 5), 1e-4
 # How far tubes go on outside an opening, in radians.
@@ -129,6 +134,12 @@ class FaceOffset:
     def bent_away(self) -> bool:
         """True where the face is bent more than the offset is wide, all over: then nothing of it bounds a core."""
         return bool(np.all(1 - self.by * self._curvatures(self._grid(_SAMPLES)) < _LEAST_STRETCH))
+
+    def may_fold(self, by: float) -> bool:
+        """Tell whether an offset so wide, in mm, may fold: not where the face is bent far less, or alike all over."""
+        if isinstance(self.base, Geom_Plane | Geom_CylindricalSurface | Geom_SphericalSurface):
+            return False
+        return bool(by * self._curvatures(self._grid(_SAMPLES)).max() > _BENT)
 
     def folding(self) -> tuple[float, float, Floats]:
         """Smallest and largest radius to which the face is bent outwards, in mm, and the place of the smallest.

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.Geom import Geom_CylindricalSurface, Geom_SphericalSurface, Geom_Surface, Geom_ToroidalSurface
+from OCP.Geom2d import Geom2d_Curve, Geom2d_Line
 from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-from OCP.gp import gp_Ax3, gp_Dir, gp_Pnt
+from OCP.gp import gp_Ax3, gp_Dir, gp_Dir2d, gp_Pnt, gp_Pnt2d
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Wire
@@ -21,12 +22,13 @@ from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.offset_surface import curve_points, derivatives, vector_of
 from gyroid_cad.kernel.spline_fit import fitted_plane_curve, fitted_surface
 
-__all__ = ["BallArc", "Tube", "ball_round", "between", "tube_round"]
+__all__ = ["BallArc", "Tube", "ball_round", "between", "straight", "tube_round"]
 
 Floats = NDArray[np.float64]
 
 # Of lengths of 1 mm, or in parts of larger ones; and the least that edges are apart from what they lie on, in mm.
 _SAME, _LEAST_TOLERANCE = 1e-9, 1e-7
+_SAME_LENGTH = 1e-12
 _SAMPLES = 9
 _ACROSS = (0.0, 0.5, 1.0)
 
@@ -117,6 +119,17 @@ def between(one: Floats, other: Floats, across: Floats) -> Floats:
     a = np.where(flat, 1 - across[:, np.newaxis], np.sin((1 - across)[:, np.newaxis] * angles) / safe)
     b = np.where(flat, across[:, np.newaxis], np.sin(across[:, np.newaxis] * angles) / safe)
     return np.asarray(a[..., np.newaxis] * one + b[..., np.newaxis] * other)
+
+
+def straight(start: Floats, stop: Floats, first: float, last: float) -> Geom2d_Curve:
+    """The straight line from a place to another between two parameters."""
+    way, length = stop - start, float(np.linalg.norm(stop - start))
+    if abs(length - (last - first)) < _SAME_LENGTH * (last - first):
+        origin = start - way / length * first
+        return Geom2d_Line(gp_Pnt2d(*origin.tolist()), gp_Dir2d(*way.tolist()))
+    return fitted_plane_curve(
+        lambda parameters: start + np.outer((parameters - first) / (last - first), way), [first, last], _SAME
+    )
 
 
 @dataclass(slots=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TypeVar
 
+import numpy as np
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepGProp import BRepGProp
 from OCP.Geom import Geom_Curve, Geom_Line
@@ -203,19 +204,27 @@ def _runs_back(edge: TopoDS_Edge) -> bool:
 
 def _place(curve: Geom_Curve, parameter: float) -> tuple[float, float, float]:
     point = curve.Value(parameter)
-    x, y, z = (round(value, _DECIMALS) + 0.0 for value in (point.X(), point.Y(), point.Z()))
+    x, y, z = _rounded(point.X(), point.Y(), point.Z())
     return x, y, z
 
 
 def sorted_by_place(shapes: Iterable[Shape]) -> list[Shape]:
     """Shapes in the order of where they are."""
-    return sorted(shapes, key=_whereabouts)
+    some = list(shapes)
+    keys = [_whereabouts(shape) for shape in some]
+    # Tight boxes of free-form faces take seconds: they are made where edges alone don't tell two shapes apart.
+    extents = [bounding_box(one) if keys.count(key) > 1 else np.empty(0) for one, key in zip(some, keys, strict=True)]
+    whole = [(key, *_rounded(*extent.ravel().tolist())) for key, extent in zip(keys, extents, strict=True)]
+    return [some[index] for index in sorted(range(len(some)), key=whole.__getitem__)]
 
 
 def _whereabouts(shape: TopoDS_Shape) -> tuple[float, ...]:
-    """Extent of a shape, the length and the middle of its edges, and how it runs: no two have all of it in common."""
+    """Length and middle of a shape's edges, and how it runs: with its extent no two have all of it in common."""
     lines = GProp_GProps()
     BRepGProp.LinearProperties_s(shape, lines)
     centre = lines.CentreOfMass()
-    values = [*bounding_box(shape).ravel().tolist(), lines.Mass(), centre.X(), centre.Y(), centre.Z()]
-    return (*(round(value, _DECIMALS) + 0.0 for value in values), float(shape.Orientation().value))
+    return (*_rounded(lines.Mass(), centre.X(), centre.Y(), centre.Z()), float(shape.Orientation().value))
+
+
+def _rounded(*values: float) -> tuple[float, ...]:
+    return tuple(round(value, _DECIMALS) + 0.0 for value in values)

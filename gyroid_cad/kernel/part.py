@@ -27,7 +27,7 @@ from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.check import is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import as_face, as_solid
-from gyroid_cad.kernel.extent import bounding_box, box_of
+from gyroid_cad.kernel.extent import bounding_box, box_of, free_form_faces
 from gyroid_cad.kernel.repair import fault_of
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
@@ -46,6 +46,7 @@ __all__ = [
     "selected_faces",
     "selected_way",
     "sound_part",
+    "triangles_by_face",
     "triangles_of",
 ]
 
@@ -95,6 +96,16 @@ class Part:
     volume: float
     box: Box | None = None
     area: float = 0.0
+
+    @cached_property
+    def face_count(self) -> int:
+        """Number of its faces."""
+        return sum(1 for _ in parts_of(self.shape, TopAbs_FACE))
+
+    @cached_property
+    def free_form_area(self) -> float:
+        """Of its area, in mm2, what is on surfaces that have no closed form."""
+        return sum(measure(face)[1] for face in free_form_faces(self.shape))
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,).
@@ -183,10 +194,18 @@ class Part:
 
 def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
     """Corners of triangles no further from a shape's faces than a deflection in mm; shape (triangles, 3, 3)."""
+    return np.concatenate([np.empty((0, 3, 3)), *triangles_by_face(shape, deflection)])
+
+
+def triangles_by_face(shape: TopoDS_Shape, deflection: float) -> list[Floats]:
+    """Corners of triangles as of :func:`triangles_of`, those of each face by themselves."""
     copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
     # In one thread, so that a process may be forked from this one.
     BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
-    return np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(copy))])
+    return [
+        np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(face))])
+        for face in parts_of(copy, TopAbs_FACE)
+    ]
 
 
 def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:

@@ -21,6 +21,7 @@ from gyroid_cad.kernel.depth import Inside, NearDistances, points_on
 from gyroid_cad.kernel.offset_pieces import offset_pieces
 from gyroid_cad.kernel.offset_surface import curve_points
 from gyroid_cad.kernel.shells import solids_of, users_of
+from gyroid_cad.kernel.skin_room import shown_place
 from gyroid_cad.kernel.split import Change, changes, general_fuse, modified
 
 __all__ = ["OpenSkinError", "core_of_pieces", "with_changes"]
@@ -50,8 +51,7 @@ class OpenSkinError(KernelError):
     """
 
     def __init__(self, point: Floats, beside: str = "") -> None:
-        place = ", ".join(f"{round(x, 3) + 0.0:g}" for x in point.tolist())
-        super().__init__(f"the inner side of the skin does not close round ({place}){beside}")
+        super().__init__(f"the inner side of the skin does not close round {shown_place(point)}{beside}")
         self.point = point
 
 

@@ -29,6 +29,7 @@ from gyroid_cad.kernel.offset import core_of
 from gyroid_cad.kernel.part import Part, require_part, selected_faces
 from gyroid_cad.kernel.shells import VolumeOf, solids_of
 from gyroid_cad.kernel.sieve import with_changes
+from gyroid_cad.kernel.skin_room import shown_place
 from gyroid_cad.kernel.split import Pieces, changes, general_fuse, inner_sides, modified
 
 __all__ = ["Hollow", "hollow", "hollow_round", "opened_faces", "openings_of"]
@@ -125,10 +126,11 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
     own = [[face for face in opened if _has(solid, face)] for solid in part.solids]
     depths = [Depths(solid, faces) for solid, faces in zip(part.solids, own, strict=True)]
     _require_skin(depths, openings)
-    deepest = [depth.deepest(skin) for depth in depths]
+    deepest, places = zip(*(depth.deepest(skin) for depth in depths), strict=True)
     if max(deepest) <= skin:
         limit = "as deep as the part is below its other faces" if opened else "half the part where it is thickest"
-        raise ParameterError("skin", skin, f"less than about {max(deepest):.3g} mm, {limit}")
+        where = shown_place(places[int(np.argmax(deepest))])
+        raise ParameterError("skin", skin, f"less than about {max(deepest):.3g} mm, {limit}, round {where}")
     _require_wide(own, depths, skin, openings)
     cores = [
         core

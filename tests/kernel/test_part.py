@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cadquery as cq
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
-from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert, BRepBuilderAPI_Sewing
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL
@@ -15,9 +16,9 @@ from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 from scipy.spatial import cKDTree
 
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import compound_of, is_valid, parts_of
+from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import as_edge, as_face
-from gyroid_cad.kernel.part import measure, require_part
+from gyroid_cad.kernel.part import require_part
 
 Floats = NDArray[np.float64]
 
@@ -134,3 +135,21 @@ def test_sampling_leaves_no_triangles_on_the_users_part() -> None:
     require_part(shape).surface_samples(0.5)
     for face in parts_of(shape, TopAbs_FACE):
         assert BRep_Tool.Triangulation_s(as_face(face), TopLoc_Location()) is None
+
+
+def test_the_volume_of_a_vase_is_that_of_the_discs_it_is_made_of() -> None:
+    profile = cq.Workplane("XZ").lineTo(6, 0).spline([(4, 4), (3, 8), (5, 12), (9, 18), (8, 26)], includeCurrent=True)
+    profile = profile.lineTo(0, 26).close()
+    (curve,) = (edge for edge in profile.val().Edges() if edge.geomType() == "BSPLINE")
+    x, _, z = np.array([place.toTuple() for place in curve.positions(np.linspace(0, 1, 20_001))]).T
+    cones = np.pi * np.diff(z) * (x[1:] ** 2 + x[1:] * x[:-1] + x[:-1] ** 2) / 3
+    vase = profile.revolve(360, (0, 0, 0), (0, 1, 0)).val().wrapped
+    assert require_part(vase).volume == pytest.approx(abs(cones.sum()), rel=1e-6)
+
+
+def test_the_same_cylinder_on_splines_is_of_free_form_all_over() -> None:
+    cylinder = BRepPrimAPI_MakeCylinder(RADIUS, SIDE).Shape()
+    part, splines = (require_part(shape) for shape in (cylinder, BRepBuilderAPI_NurbsConvert(cylinder).Shape()))
+    assert part.free_form_area == 0
+    assert splines.free_form_area == pytest.approx(part.area, rel=1e-3)
+    assert (splines.volume, splines.face_count) == (pytest.approx(part.volume, rel=1e-6), part.face_count)

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from numpy.typing import NDArray
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
-from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_NurbsConvert
+from OCP.Convert import Convert_TgtThetaOver2_4
+from OCP.Geom import Geom_Circle, Geom_TrimmedCurve
 from OCP.GeomAbs import (
     GeomAbs_BSplineSurface,
     GeomAbs_Cylinder,
@@ -20,14 +23,16 @@ from OCP.GeomAbs import (
     GeomAbs_Sphere,
     GeomAbs_SurfaceType,
 )
-from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
+from OCP.GeomConvert import GeomConvert
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopoDS import TopoDS_Face, TopoDS_Solid
 
 import gyroid_cad.kernel.sieve
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of, topology
-from gyroid_cad.kernel.compat import as_face, as_solid
+from gyroid_cad.kernel.compat import as_edge, as_face, as_solid, as_vertex
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
+from gyroid_cad.kernel.offset_surface import curve_points
 from gyroid_cad.kernel.part import require_part
 from gyroid_cad.kernel.sieve import core_of_pieces
 from gyroid_cad.kernel.skin import hollow
@@ -229,3 +234,29 @@ def test_a_random_part_has_a_skin_or_is_refused_with_a_reason(
             print(f"refused: {refused}")
             continue
         assert Depths(part.solids[0], []).confirm(core.solids, skin)
+
+
+def with_coarse_edges(made: bd.Shape) -> TopoDS_Solid:
+    """A solid whose circles are splines that run through them at another pace, as some programs write them."""
+    solid, builder = BRepBuilderAPI_Copy(solid_of(made)).Shape(), BRep_Builder()
+    for edge in map(as_edge, parts_of(solid, TopAbs_EDGE)):
+        circle, (first, last) = BRep_Tool.Curve_s(edge, 0.0, 0.0), BRep_Tool.Range_s(edge)
+        if isinstance(circle, Geom_Circle):
+            piece = Geom_TrimmedCurve(circle, first, last)
+            spline = GeomConvert.CurveToBSplineCurve_s(piece, Convert_TgtThetaOver2_4)
+            parameters = np.linspace(first, last, 40)
+            off = float(
+                np.linalg.norm(curve_points(spline, parameters) - curve_points(circle, parameters), axis=1).max()
+            )
+            builder.UpdateEdge(edge, spline, 1.1 * off)
+            for end in parts_of(edge, TopAbs_VERTEX):
+                builder.UpdateVertex(as_vertex(end), 1.1 * off)
+    assert is_valid(solid)
+    return as_solid(solid)
+
+
+def test_a_part_whose_edges_are_coarser_than_its_faces_has_a_valid_core() -> None:
+    bolt = bd.Cylinder(5, 12) + bd.Pos(0, 0, 7) * bd.Cylinder(8, 4)
+    exact, coarse = (compound_of(core_of_pieces(solid, 1.0)) for solid in (solid_of(bolt), with_coarse_edges(bolt)))
+    assert is_valid(coarse)
+    assert measure(coarse)[0] == pytest.approx(measure(exact)[0], rel=1e-3)

@@ -34,7 +34,7 @@ from gyroid_cad.wall.covering import (
     periodic_offsets,
     wall_extremes,
 )
-from gyroid_cad.wall.distances import nearest_offsets
+from gyroid_cad.wall.distances import in_wall
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
@@ -48,7 +48,6 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-_BLOCK_SAMPLES = 13
 # Places of a part that tell what of it a block covers; and how often the block is cut back where its wall would fold.
 _COVER_POINTS, _MOST_CUTS = 2000, 20
 
@@ -99,29 +98,17 @@ class Infill:
         return periodic_offsets(self.frame, self.grading.cell_size, points, self.grading.surface)
 
     def contains(self, region: Region, points: Floats) -> Booleans:
-        """Mask of the points of the part's space, shape (n, 3), that lie in a region, to about 1e-3 cell sizes."""
+        """Mask of the points of the part's space, shape (n, 3), that lie in a region, to about 1e-3 cell sizes.
+
+        Of a block the wall is the only region, and known as it was fitted, with its ends.
+        """
         if not self.endless:
-            return self._block_holds(region, points)
+            return in_wall(self.wall, points)
         if self.grading.uniform:
             return region.contains(self.offsets(points), np.full(len(points), self.max_thickness / 2))
         own = self.frame.own(points)
         half_thickness = self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2
         return region.contains(self.offsets(points), half_thickness)
-
-    def _block_holds(self, region: Region, points: Floats) -> Booleans:
-        fitted = [
-            fitted for _, fitted in offset_patches(self.complex, self.grading, np.linspace(-1, 1, _BLOCK_SAMPLES))
-        ]
-        places, normals, thickness = (
-            np.concatenate([getattr(some, name) for some in fitted]) for name in ("points", "normals", "thickness")
-        )
-        own = self.frame.own(points)
-        offsets, nearest = nearest_offsets(places, normals, own)
-        # Beyond the block's boundary edges the nearest sample is far to the side.
-        grid = places.reshape(-1, _BLOCK_SAMPLES, _BLOCK_SAMPLES, 3)
-        gap = sum(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).max() for axis in (1, 2)) / 2
-        aside = np.linalg.norm(own - places[nearest] - offsets[:, np.newaxis] * normals[nearest], axis=1)
-        return np.asarray(region.contains(offsets, thickness[nearest] / 2) & (aside <= gap))
 
     def bounding(self, region: Region, patches: Integers) -> tuple[LatticeFaces, Booleans]:
         """Faces of some patches that bound a region, side walls too, and whether their normals point into it."""

@@ -93,6 +93,7 @@ class _Realisation:
     # Vertices -------------------------------------------------------------------------------------------------------
 
     def vertex(self, number: int) -> TopoDS_Vertex:
+        number = self.cut.twins.get(number, number)
         if number in self.fan_of:
             return self.fan_vertex(self.fan_of[number])
         if number not in self.vertices:

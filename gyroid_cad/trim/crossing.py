@@ -21,7 +21,7 @@ from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.ends import ends_of, halved
 from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs, pairs_of
 from gyroid_cad.trim.loops import decided, linked, nested
-from gyroid_cad.trim.nodes import part_nodes, rim_nodes
+from gyroid_cad.trim.nodes import part_nodes, rim_nodes, twin_nodes
 from gyroid_cad.trim.paths import Ends, closed_paths, open_paths
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve, fitted_sections
@@ -150,6 +150,8 @@ class _Work:
         # Vertices: the part's own, then the nodes in the order of their numbers; corners of the wall as they are met.
         self.first = len(made.boundary.vertices)
         made.points += [*made.boundary.vertices, *self.rim_nodes.points, *self.part_nodes.points, *points]
+        twins = twin_nodes(faces, self.rim_nodes)
+        made.twins.update({self.first + node: self.first + other for node, other in twins.items()})
         self.edge_numbers: dict[tuple[str, int, int], int] = {}
         self.sections_of_face: dict[int, list[int]] = {}
         self.sections_of_part: dict[int, list[int]] = {}

@@ -78,6 +78,11 @@ class LatticeFaces:
         fans = self.side[:, None] * count + self.wall.complex.patch_fans[self.patch]
         return np.where(self._ends, np.stack([start, end, count + end, count + start], axis=1), fans)
 
+    def corners(self, rims: Integers) -> Integers:
+        """The complex's corner of every rim that is a post, -1 of others: posts of fans at one corner are one line."""
+        fans = rims - len(SIDES) * self.wall.complex.edge_count
+        return np.where(fans >= 0, self.wall.complex.fan_corner[np.maximum(fans, 0)], -1)
+
     @property
     def _ends(self) -> Booleans:
         """Mask of the walls where the lattice ends; shape (faces, 1)."""

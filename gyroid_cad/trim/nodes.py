@@ -18,7 +18,7 @@ from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs
 
-__all__ = ["PartNodes", "RimNodes", "part_nodes", "rim_nodes"]
+__all__ = ["PartNodes", "RimNodes", "part_nodes", "rim_nodes", "twin_nodes"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -139,6 +139,18 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     order = np.lexsort((along, rim[which]))
     which = which[order]
     return RimNodes(flat[rim[which]], part[which], along[order], inwards[order], places[order], points[order])
+
+
+def twin_nodes(faces: LatticeFaces, nodes: RimNodes) -> dict[int, int]:
+    """Nodes at which posts of several fans at one corner come to the same place, each by that of the first of them."""
+    corners = faces.corners(nodes.rim)
+    first: dict[tuple[int, int, int], int] = {}
+    twins = {}
+    for node in np.flatnonzero(corners >= 0).tolist():
+        key = int(corners[node]), int(nodes.part[node]), round(float(nodes.along[node]) / _AT_CORNER)
+        if first.setdefault(key, node) != node:
+            twins[node] = first[key]
+    return twins
 
 
 def _may_cross(pairs: Pairs, face: Integers, side: Integers, part: Integers) -> Booleans:

@@ -75,6 +75,8 @@ class Crossing:
         Vertices; the first are the part's own.
     fans : dict
         Vertices at corners of the wall's faces, by the numbers of their fans.
+    twins : dict
+        Vertices that are one with another: where posts of two fans, which are one line, come to the part's boundary.
     edges : list of CutEdge
     sections : list of SectionCurve
     lattice : list of CutLoops
@@ -88,6 +90,7 @@ class Crossing:
     backwards: Booleans
     points: list[Floats] = field(default_factory=list)
     fans: dict[int, int] = field(default_factory=dict)
+    twins: dict[int, int] = field(default_factory=dict)
     edges: list[CutEdge] = field(default_factory=list)
     sections: list[SectionCurve] = field(default_factory=list)
     lattice: list[CutLoops] = field(default_factory=list)

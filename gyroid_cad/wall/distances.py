@@ -1,7 +1,8 @@
 """Distances between points and a wall: nearest samples, feet of perpendiculars, and lines that meet the faces.
 
 Three grades of the same question: :func:`nearest_offsets` takes the nearest sample for the foot, :class:`WallFaces`
-goes on from samples by one step, :func:`distances_from_patches` goes on to rounding.
+goes on from samples by one step, :func:`distances_from_patches` goes on to rounding; so does :func:`in_wall`, to
+tell inside from outside.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ __all__ = [
     "Feet",
     "WallFaces",
     "distances_from_patches",
+    "in_wall",
     "met_along_normals",
     "nearest_offsets",
     "nearest_patches",
@@ -42,6 +44,10 @@ _PATCH_SAMPLES, _PATCHES_AT_ONCE = 9, 4_000
 _STARTS = 6
 # So many queries and neighbours at a time that what is computed for them stays small.
 _PAIRS_AT_ONCE = 200_000
+# Samples from whose patches places in the wall are looked for, steps of Newton's method, how far out they may come, and
+# how near a side a place is on it, in the patches' parameters.
+_NEIGHBOURS, _LAYER_STEPS, _OUTSIDE, _ON_SIDE = 12, 12, 1.5, 1e-9
+_BEFORE = np.tri(_NEIGHBOURS, k=-1, dtype=bool)
 # In steps between samples: the foot belongs to the nearest sample along each side, and a little is overlap.
 _OWN_FOOT = 0.6
 # A place lies in the wall only if it stands over its foot: beyond a boundary edge the foot is aside.
@@ -232,6 +238,57 @@ def nearest_patches(wall: Wall, points: Floats) -> tuple[Floats, Integers]:
         distance[nearer] = np.asarray(found[0])[nearer]
         patch[nearer] = first + np.asarray(found[1])[nearer] // places.shape[1]
     return distance, patch
+
+
+def in_wall(wall: Wall, points: Floats) -> Booleans:
+    """Tell which points lie in a wall, up to the side walls where it ends.
+
+    A place in it has parameters of its own, those of its patch and a third one through the wall, which Newton's method
+    finds from samples of the mid-surface nearby.
+
+    Parameters
+    ----------
+    wall : Wall
+    points : ndarray, shape (n, 3)
+        In mm.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    knots = (wall.knots, wall.knots)
+    middles, halves = (wall.nets[:, 1] + wall.nets[:, 0]) / 2, (wall.nets[:, 1] - wall.nets[:, 0]) / 2
+    point, patch, start = _starts_nearby(wall, middles, np.linalg.norm(halves, axis=-1).max(), points)
+    net = wall.patch_net[patch]
+    own = points[point] - wall.shifts[wall.patch_shift[patch]]
+    found = np.append(start, np.zeros((1, len(point))), axis=0).T
+    for _ in range(_LAYER_STEPS):
+        u, v, w = found.T[..., np.newaxis]
+        middle, half = (
+            np.stack(point_derivatives(some[net], wall.weights, knots, u, v))[:, :, 0] for some in (middles, halves)
+        )
+        place, along_u, along_v = middle + w * half
+        jacobian = np.stack([along_u, along_v, half[0]], axis=-1)
+        regular = np.abs(np.linalg.det(jacobian)) > np.finfo(float).tiny
+        jacobian[~regular] = np.eye(3)
+        step = np.linalg.solve(jacobian, (own - place)[..., np.newaxis])[..., 0]
+        found = np.clip(found + np.clip(step, -0.5, 0.5), -_OUTSIDE, _OUTSIDE)
+    inside = regular & np.all(np.abs(found) <= 1 + _ON_SIDE, axis=1) & np.all(np.abs(step) < _ON_SIDE, axis=1)
+    return np.bincount(point[inside], minlength=len(points)) > 0
+
+
+def _starts_nearby(wall: Wall, middles: Floats, half: float, points: Floats) -> tuple[Integers, Integers, Floats]:
+    """Points, patches whose mid-surfaces have samples nearby, each once, and the nearest sample's parameters (2, m)."""
+    samples = np.linspace(-1, 1, _PATCH_SAMPLES)
+    grids = grid_points(middles, wall.weights, (wall.knots, wall.knots), samples, samples)
+    between = sum(np.linalg.norm(np.diff(grids, axis=axis), axis=-1).max() for axis in (1, 2))
+    places = grids.reshape(len(grids), -1, 3)[wall.patch_net] + wall.shifts[wall.patch_shift][:, np.newaxis]
+    apart, nearest = tree_of(places.reshape(-1, 3)).query(points, k=_NEIGHBOURS)
+    patch, sample = np.divmod(nearest, len(samples) ** 2)
+    # Samples come in the order of their distances: of those of one patch the first is the nearest.
+    known = (patch[:, :, np.newaxis] == patch[:, np.newaxis]) & _BEFORE
+    point, rank = np.nonzero(~known.any(axis=2) & (apart <= half + between))
+    return point, patch[point, rank], samples[np.stack(np.divmod(sample[point, rank], len(samples)))]
 
 
 def distances_from_patches(wall: Wall, points: Floats, patches: Integers) -> Floats:

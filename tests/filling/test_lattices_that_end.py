@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import cadquery as cq
+import numpy as np
 import pytest
 import trimesh
 
@@ -21,6 +22,7 @@ from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.maps import Cylinder, SpaceMap
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.areas import fitted_areas
 from gyroid_cad.wall.covering import AT_HOME
 from gyroid_cad.wall.offset import Wall
@@ -117,12 +119,20 @@ def test_files_of_a_lattice_that_ends_in_a_part_are_closed_and_hold_as_much(tmp_
     assert mesh.volume == pytest.approx(made.report.volume, rel=3e-3)
 
 
-def test_a_skin_is_fused_with_a_lattice_that_ends_within_it() -> None:
-    skin, (radius, height) = 0.4, (2.2, 12)
-    inner = cq.Workplane().circle(radius - skin).extrude(height - 2 * skin).translate((3.1, 2.9, skin - 3))
-    within, made = filled(inner, GRADED).report, filled(ROD, GRADED, skin=skin).report
+def test_a_skin_is_fused_with_a_lattice_whose_posts_meet_at_it() -> None:
+    complex = wall_in(CUBE, block()).complex
+    # At a corner with two fans two pairs of side walls touch in a line: the core's side goes across it.
+    corner = complex.corner_quarters[np.argmax(np.bincount(complex.fan_corner) > 1)] * (CELL / CELL_QUARTERS)
+    x, y, z = (float(value) for value in SHEARED.function(*corner))
+    skin, half = 0.5, 8.0
+    core, part = (
+        cq.Workplane().box(size, size, size).translate((x + half + 0.03, y, z))
+        for size in (2 * half, 2 * (half + skin))
+    )
+    within, made = filled(core, block()).report, filled(part, block(), skin=skin).report
     assert (made.solids, len(made.voids)) == (1, 1)
-    assert made.volume == pytest.approx(made.part_volume - within.part_volume + within.volume, rel=1e-6)
+    assert made.shift == (0, 0, 0)
+    assert made.volume == pytest.approx(made.part_volume - within.part_volume + within.volume, rel=1e-7)
 
 
 def test_a_lattice_that_nothing_of_comes_to_the_part_is_an_error() -> None:

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.nurbs.surface import grid_points
+from gyroid_cad.nurbs.surface import grid_points, point_derivatives
 from gyroid_cad.surface.families import SURFACES
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.surface.patch import smooth
 from gyroid_cad.wall.distances import (
     distances_from_patches,
+    in_wall,
     met_along_normals,
     nearest_offsets,
     nearest_patches,
@@ -120,3 +121,27 @@ def test_an_offset_from_samples_of_a_plane_is_the_height_above_it(height: float,
     )
     assert offsets[0] == pytest.approx(height)
     assert np.abs(places[nearest[0], :2] - (x, y)).max() <= 0.05 + 1e-12
+
+
+def test_places_of_a_wall_lie_in_it_and_none_beyond_its_faces_or_ends() -> None:
+    wall = Lattice((2, 1, 1), 8.0, "0.9 + 0.02*x", fit=FitSettings(5), tolerance=1e-2).wall()
+    draw = np.random.default_rng(4)
+    patch = draw.integers(wall.complex.patch_count, size=4000)
+    places = draw.uniform(-1, 1, (len(patch), 3))
+    beyond = draw.integers(3, size=len(patch)), draw.choice([-1.001, 1.001], len(patch))
+    outside = places.copy()
+    outside[np.arange(len(patch)), beyond[0]] = beyond[1]
+    # Sides as they run round the square: v = -1, u = 1, v = 1, u = -1; there others go on, but where the wall ends.
+    side = np.where(beyond[0] == 0, np.where(beyond[1] > 0, 1, 3), np.where(beyond[1] > 0, 2, 0))
+    ends = (beyond[0] == 2) | wall.complex.free[wall.complex.patch_edges[patch, side]]
+
+    def layer(some: Floats) -> Floats:
+        knots, (u, v, w) = (wall.knots, wall.knots), some.T[..., np.newaxis]
+        low, high = (
+            point_derivatives(wall.nets[wall.patch_net[patch], k], wall.weights, knots, u, v, 0)[0][:, 0]
+            for k in (0, 1)
+        )
+        return low + (w + 1) / 2 * (high - low) + wall.shifts[wall.patch_shift[patch]]
+
+    assert np.all(in_wall(wall, layer(places)))
+    assert not np.any(in_wall(wall, layer(outside))[ends])

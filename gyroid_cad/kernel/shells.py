@@ -25,6 +25,8 @@ __all__ = ["Use", "VolumeOf", "connected_shells", "inner_point", "lies_in", "sol
 VolumeOf = Callable[[TopoDS_Shape], float]
 
 _CLASSIFYING_TOLERANCE = 1e-7
+# Of the largest volume, below which a shell is small.
+_TOLD = 1e-4
 _BOTH_WAYS = {TopAbs_FORWARD, TopAbs_REVERSED}
 
 
@@ -113,11 +115,15 @@ def _solids(shells: Sequence[TopoDS_Shell], volume_of: VolumeOf | None) -> list[
     builder = BRep_Builder()
     outer: list[TopoDS_Solid] = []
     voids: list[TopoDS_Shell] = []
-    for shell in shells:
+    volumes = [volume_of(shell) for shell in shells] if volume_of else []
+    least = _TOLD * max(volumes, default=0.0)
+    for index, shell in enumerate(shells):
         solid = TopoDS_Solid()
         builder.MakeSolid(solid)
         builder.Add(solid, shell)
-        if volume_of(shell) < 0 if volume_of else _holds_infinity(solid):
+        # Faces with coarse edges are measured no closer: of what is small the sign of its volume tells nothing.
+        told = bool(volumes) and abs(volumes[index]) >= least
+        if volumes[index] < 0 if told else _holds_infinity(solid):
             voids.append(shell)
         else:
             outer.append(solid)

@@ -8,13 +8,16 @@ from collections.abc import Iterator
 import build123d as bd
 import numpy as np
 import pytest
-from OCP.TopoDS import TopoDS_Solid
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopoDS import TopoDS_Shape, TopoDS_Solid
 
 import gyroid_cad.kernel.offset
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import compound_of
+from gyroid_cad.kernel.check import compound_of, measure, parts_of
+from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.offset import OPEN_WAYS
 from gyroid_cad.kernel.part import Part, require_part
+from gyroid_cad.kernel.shells import solids_of
 from gyroid_cad.kernel.skin import hollow, hollow_round
 from gyroid_cad.kernel.skin_room import SkinRoom
 
@@ -92,3 +95,14 @@ def test_a_core_of_the_users_own_leaves_a_skin_where_none_can_be_made() -> None:
     made = hollow_round(part_of(waved(36)), part_of(bd.Pos(0, 0, 3) * bd.Cylinder(5, 4)))
     assert made.thickness == pytest.approx(1.0)
     assert made.core.volume == pytest.approx(np.pi * 5**2 * 4)
+
+
+def test_a_small_void_stays_one_though_coarse_edges_have_its_volume_measured_wrongly() -> None:
+    outer, void = (solid_of(made) for made in (bd.Box(20, 20, 20), bd.Box(0.2, 0.2, 0.2)))
+    turned = [as_face(face.Reversed()) for face in parts_of(void, TopAbs_FACE)]
+
+    def measured(shell: TopoDS_Shape) -> float:
+        return 0.002 if measure(shell)[0] < 0 else 8000.0
+
+    (made,) = solids_of([*map(as_face, parts_of(outer, TopAbs_FACE)), *turned], measured)
+    assert measure(made)[0] == pytest.approx(8000 - 0.008)

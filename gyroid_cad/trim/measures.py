@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-_PER_STRETCH, _RIM_PIECES, _PART_PIECES = 3, 8, 64
+_PER_STRETCH, _PER_RIM_SPAN, _PART_PIECES = 3, 5, 64
 # Of a face of the part that is no plane, along each parameter.
 _SPANS, _MOST_SPANS = 12, 40
 # So many places at a time.
@@ -123,12 +123,10 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
 
     # Of the integral from u = -1 the sides 0, 2 and 3 have nothing: either it is 0 there, or v does not change.
     rim = np.flatnonzero(~section & (side == 1))
-    t, weights = gauss_points(np.linspace(0, 1, _RIM_PIECES + 1), _PER_STRETCH)
-    span = np.diff(limits[rim], axis=1)
-    v = limits[rim, :1] + span * t
+    v, weights = _between_knots(cut.faces.wall.knots, limits[rim])
     places.append(np.stack([np.ones_like(v), v], axis=-1).reshape(-1, 2))
-    rates.append((turn[rim, None] * span * weights).ravel())
-    pieces.append(np.repeat(piece[rim], len(t)))
+    rates.append((turn[rim, None] * weights).ravel())
+    pieces.append(np.repeat(piece[rim], v.shape[1]))
     for count, some in grouped(np.array([len(control) for control in curves], dtype=np.int64)):
         stacked = np.stack([curves[k] for k in some.tolist()], axis=1).reshape(count, -1)
         t, weights = _gauss_between(count)
@@ -137,6 +135,18 @@ def _square_borders(cut: Crossing) -> tuple[Floats, Floats, Integers]:
         rates.append((turn[rows[some]] * weights[:, None] * rate[..., 1]).ravel())
         pieces.append(np.tile(piece[rows[some]], len(t)))
     return np.concatenate(places), np.concatenate(rates), np.concatenate(pieces)
+
+
+def _between_knots(knots: Floats, limits: Floats) -> tuple[Floats, Floats]:
+    """Gauss points (n, m) from a limit to another of each row (n, 2), and their weights; none reaches across a knot.
+
+    There the second derivatives of what is integrated leap.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_PER_RIM_SPAN)
+    stops = np.clip(np.unique(knots), limits.min(axis=1, keepdims=True), limits.max(axis=1, keepdims=True))
+    half, middle = np.diff(stops)[..., None] / 2, (stops[:, 1:, None] + stops[:, :-1, None]) / 2
+    way = np.sign(limits[:, 1] - limits[:, 0])[:, None, None]
+    return (middle + half * nodes).reshape(len(limits), -1), (way * half * weights).reshape(len(limits), -1)
 
 
 def _on_sides(cut: Crossing, face: Integers, edges: list[CutEdge]) -> tuple[Integers, Floats]:

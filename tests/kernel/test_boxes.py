@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cadquery as cq
 import numpy as np
 import pytest
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeTorus
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeTorus
+from OCP.gp import gp_Vec
 from OCP.TopAbs import TopAbs_FACE
 
 from gyroid_cad.kernel.check import parts_of
@@ -23,3 +25,16 @@ def test_a_piece_of_a_ring_lies_in_its_box(first: float, last: float) -> None:
     points = np.column_stack([away * np.cos(u), away * np.sin(u), PIPE * np.sin(v)])
     assert (points >= low - 1e-9).all()
     assert (points <= high + 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_extruded_spline_lies_in_its_box(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    spline = cq.Edge.makeSpline([cq.Vector(*place) for place in random.uniform(-9, 9, (5, 2))], periodic=True)
+    prism = BRepPrimAPI_MakePrism(spline.wrapped, gp_Vec(0, 0, 3)).Shape()
+    (low_x, low_y, _), (high_x, high_y, _) = corners_of(box_round([prism]))
+    x, y, _ = np.array([place.toTuple() for place in spline.positions(np.linspace(0, 1, 5001))]).T
+    assert low_x <= x.min() + 1e-7
+    assert low_y <= y.min() + 1e-7
+    assert high_x >= x.max() - 1e-7
+    assert high_y >= y.max() - 1e-7

@@ -59,8 +59,9 @@ __all__ = ["main"]
 
 _SURFACES: tuple[SurfaceName, ...] = ("gyroid", "diamond", "primitive")
 _KINDS: tuple[Kind, ...] = ("sheet", "channels")
-# How far wall and channels together may be from the part, and the share of parts that may fail.
-_OFF, _FAILED = 1e-5, 0.02
+# How far wall and channels together may be from the part, also where only one of them was shifted, and the share of
+# parts that may fail.
+_OFF, _OFF_SHIFTED, _FAILED = 1e-5, 1e-3, 0.02
 _COARSE = FitSettings(5)
 
 
@@ -132,7 +133,9 @@ def _outcome(seed: int) -> str:
     off = sum(report.volume for report in reports) / whole - 1
     if not all(report.valid and report.closed for report in reports):
         return "invalid"
-    if abs(off) > _OFF:
+    # A lattice that was shifted for one of them leaves a little between wall and channels.
+    alike = len({report.shift for report in reports}) == 1
+    if abs(off) > (_OFF if alike else _OFF_SHIFTED):
         return f"volume off: by {off:.1e}"
     if not all(report.by_sections for report in reports):
         return f"by booleans: {surface}, cells of {cell:.3g}, {failures}"

@@ -42,6 +42,8 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
+# Share of all volume that a piece may be below zero by: rounding.
+_INSIDE_OUT = 1e-9
 # An estimate of the volume from so many points; further off than so many of its deviations, something is wrong.
 _ESTIMATE_POINTS, _ESTIMATE_DEVIATIONS, _ESTIMATE_ERROR = 4096, 6.0, 0.02
 # Of the layer round a bare surface whose volume tells its area, in cell sizes.
@@ -183,7 +185,11 @@ class Filling:
             hits = int(np.sum(infill.contains(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
         skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
-        size = sum(piece_size(piece) for piece in made) - skin
+        sizes = [piece_size(piece) for piece in made]
+        if min(sizes, default=0.0) < -_INSIDE_OUT * sum(map(abs, sizes)):
+            # Beside another that is too large it would not be seen in their sum.
+            raise KernelError(f"a piece of the {region.name} is inside out")
+        size = sum(sizes) - skin
         expected, deviation = hits * box, np.sqrt(hits + 1) * box
         if not abs(size - expected) <= _ESTIMATE_DEVIATIONS * deviation + _ESTIMATE_ERROR * expected:
             unit = "mm2" if region.surface else "mm3"

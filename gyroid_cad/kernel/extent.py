@@ -10,7 +10,14 @@ from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
-from OCP.GeomAbs import GeomAbs_Cone, GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere, GeomAbs_Torus
+from OCP.GeomAbs import (
+    GeomAbs_BSplineSurface,
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
 from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
@@ -24,6 +31,8 @@ __all__ = ["bounding_box", "box_of", "box_round", "corners_of", "free_form_faces
 _BOX_FACES, _BOX_CORNERS = 6, 8
 # How far from square a box may be, in radians and in parts of its largest extent.
 _SQUARE = 1e-9
+# Of a torus whose parameter runs through zero the kernel's quick box leaves out half, of what is extruded some 1e-3 mm.
+_BOXED_WELL = {GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_BSplineSurface}
 _IN_CLOSED_FORM = {GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus}
 
 
@@ -32,6 +41,9 @@ def box_round(shapes: Iterable[TopoDS_Shape]) -> Bnd_Box:
     box = Bnd_Box()
     for shape in shapes:
         BRepBndLib.Add_s(shape, box)
+        for face in map(as_face, parts_of(shape, TopAbs_FACE)):
+            if BRepAdaptor_Surface(face, False).GetType() not in _BOXED_WELL:
+                BRepBndLib.AddOptimal_s(face, box, False, False)
     return box
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import signed_volumes
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.graph import connected
@@ -114,8 +114,7 @@ class TrianglePart:
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, their normals, and how far at most any place on it is from one, in mm."""
         vertices, triangles = self.body.triangles()
-        a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-        return *spread_points(a, b, c, spacing), spacing
+        return *spread_points(vertices[triangles], spacing), spacing
 
     def bodies(self) -> list[TrianglePart]:
         """Parts of it that hang together, each by itself."""
@@ -216,10 +215,7 @@ def triangle_part(
 
 def _lost(shape: Any, meshes: Sequence[tuple[Floats, Integers, Integers]]) -> float:
     """Share of a shape's volume that its triangles are off by."""
-    volume = 0.0
-    for vertices, triangles, _ in meshes:
-        a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
-        volume += float(dot(a, np.cross(b, c)).sum()) / 6
+    volume = sum(float(signed_volumes(vertices, triangles).sum()) for vertices, triangles, _ in meshes)
     return abs(volume / volume_of(shape, _CLOSENESS) - 1)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -51,7 +51,6 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 # Of the triangles that distances are measured from, in parts of the largest extent.
@@ -135,16 +134,11 @@ class Part:
     def _signed_distances(self) -> tuple[SignedDistances | None, float]:
         """Distances from a closed mesh, if there is one, and how near to it the surface may run, in mm."""
         for deflection in _INSIDE_DEFLECTIONS * float(np.max(self.high - self.low)):
-            corners = np.concatenate([np.stack(some, axis=1) for some in self._meshed(float(deflection))])
+            corners = np.concatenate(triangles_by_face(self.shape, float(deflection), threads=True))
             vertices, triangles, _ = numbered_corners(corners)
             if not unmatched_edges(triangles):
                 return SignedDistances(vertices, triangles), _BAND * float(deflection)
         return None, 0.0
-
-    def _meshed(self, deflection: float) -> Iterator[tuple[Floats, Floats, Floats]]:
-        copy = BRepBuilderAPI_Copy(self.shape, False, False).Shape()
-        BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, True)
-        return _triangles(copy)
 
     def points_inside(self, count: int) -> Floats:
         """Points spread at random over the inside, the same ones each time; shape (n, 3), as many as are wanted."""
@@ -188,8 +182,9 @@ class Part:
         error : float
         """
         deflection = min(_DEFLECTION * float(np.max(self.high - self.low)), spacing / 4)
-        a, b, c, face = _of_faces(self._meshed(deflection))
-        return *spread_points(a, b, c, spacing, face), spacing + deflection
+        corners = triangles_by_face(self.shape, deflection, threads=True)
+        face = np.repeat(np.arange(len(corners)), [len(some) for some in corners])
+        return *spread_points(np.concatenate(corners), spacing, face), spacing + deflection
 
 
 def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
@@ -197,15 +192,20 @@ def triangles_of(shape: TopoDS_Shape, deflection: float) -> Floats:
     return np.concatenate([np.empty((0, 3, 3)), *triangles_by_face(shape, deflection)])
 
 
-def triangles_by_face(shape: TopoDS_Shape, deflection: float) -> list[Floats]:
-    """Corners of triangles as of :func:`triangles_of`, those of each face by themselves."""
+def triangles_by_face(shape: TopoDS_Shape, deflection: float, threads: bool = False) -> list[Floats]:
+    """Corners of triangles as of :func:`triangles_of`, anticlockwise from outside, those of each face by themselves.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    deflection : float
+        In mm.
+    threads : bool
+        Whether the mesher may start some: then no process may be forked from this one meanwhile.
+    """
     copy = BRepBuilderAPI_Copy(shape, False, False).Shape()
-    # In one thread, so that a process may be forked from this one.
-    BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, False)
-    return [
-        np.concatenate([np.empty((0, 3, 3)), *(np.stack(some, axis=1) for some in _triangles(face))])
-        for face in parts_of(copy, TopAbs_FACE)
-    ]
+    BRepMesh_IncrementalMesh(copy, deflection, False, _ANGULAR_DEFLECTION, threads)
+    return [_corners_of(as_face(face)) for face in parts_of(copy, TopAbs_FACE)]
 
 
 def points_within(low: Floats, high: Floats, contains: Callable[[Floats], Booleans], count: int) -> Floats:
@@ -266,27 +266,17 @@ def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
     return fix.Shape() if is_valid(fix.Shape()) else shape
 
 
-def _triangles(shape: TopoDS_Shape) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Corners of the triangles of each meshed face, anticlockwise from outside: three arrays (triangles, 3)."""
-    for part in parts_of(shape, TopAbs_FACE):
-        location = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(as_face(part), location)
-        if mesh is None:
-            continue
-        move = location.Transformation()
-        points = (mesh.Node(index).Transformed(move) for index in range(1, mesh.NbNodes() + 1))
-        nodes = np.array([(point.X(), point.Y(), point.Z()) for point in points])
-        corners = np.array([mesh.Triangle(index).Get() for index in range(1, mesh.NbTriangles() + 1)]) - 1
-        if part.Orientation() == TopAbs_REVERSED:
-            corners = corners[:, ::-1]
-        yield nodes[corners[:, 0]], nodes[corners[:, 1]], nodes[corners[:, 2]]
-
-
-def _of_faces(triangles: Iterable[tuple[Floats, Floats, Floats]]) -> tuple[Floats, Floats, Floats, Integers]:
-    """Corners of the triangles of all faces, three times (triangles, 3), and the face of each triangle."""
-    found = list(triangles)
-    a, b, c = (np.concatenate(corners) for corners in zip(*found, strict=True))
-    return a, b, c, np.repeat(np.arange(len(found)), [len(some) for some, _, _ in found])
+def _corners_of(face: TopoDS_Face) -> Floats:
+    """Corners of the triangles of a meshed face, anticlockwise from outside; none where the mesher left it out."""
+    location = TopLoc_Location()
+    mesh = BRep_Tool.Triangulation_s(face, location)
+    if mesh is None:
+        return np.empty((0, 3, 3))
+    move = location.Transformation()
+    points = (mesh.Node(index).Transformed(move) for index in range(1, mesh.NbNodes() + 1))
+    nodes = np.array([(point.X(), point.Y(), point.Z()) for point in points])
+    corners = np.array([mesh.Triangle(index).Get() for index in range(1, mesh.NbTriangles() + 1)]) - 1
+    return np.asarray(nodes[corners[:, ::-1] if face.Orientation() == TopAbs_REVERSED else corners])
 
 
 OPENINGS = 'faces of the part, selectors such as ">Z" or "<X", or points (x, y, z) on them'

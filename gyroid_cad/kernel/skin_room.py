@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -76,10 +77,14 @@ class SkinRoom:
         numbered = enumerate((as_face(face) for face in parts_of(solid, TopAbs_FACE)), 1)
         self._faces = [(n, face) for n, face in numbered if not any(face.IsSame(opening) for opening in openings)]
         self._skin = skin
-        shape = compound_of(face for _, face in self._faces)
-        extent = float(np.ptp(corners_of(box_round([shape])), axis=0).max())
+        self._shape = compound_of(face for _, face in self._faces)
+        extent = float(np.ptp(corners_of(box_round([self._shape])), axis=0).max())
         self._deflection = max(min(_DEFLECTION * skin, _COARSE * extent), _FINE * extent)
-        self._corners = triangles_by_face(shape, self._deflection)
+
+    @cached_property
+    def _corners(self) -> list[Floats]:
+        """Triangles of each face: of a part without free-form faces they are asked for where a skin fails alone."""
+        return triangles_by_face(self._shape, self._deflection)
 
     def rooms(self, most: float) -> list[FaceRoom]:
         """Room below every face that gets a skin, as far as that is less than the most, in mm.
@@ -115,11 +120,8 @@ class SkinRoom:
 
     def crossing_pairs(self) -> int:
         """Count pairs of free-form faces, flat ones left out, that are so near that their offsets may meet."""
-        bent = [
-            some
-            for (_, face), some in zip(self._faces, self._corners, strict=True)
-            if free_form_faces(face) and _is_bent(some)
-        ]
+        free = [index for index, (_, face) in enumerate(self._faces) if free_form_faces(face)]
+        bent = [self._corners[index] for index in free if _is_bent(self._corners[index])]
         boxes = [(some.min(axis=(0, 1)) - self._skin, some.max(axis=(0, 1)) + self._skin) for some in bent]
         return sum(
             bool(np.all(low <= other_high) and np.all(other_low <= high))

@@ -146,10 +146,8 @@ def _between_knots(knots: Floats, limits: Floats) -> tuple[Floats, Floats]:
     stops = np.clip(np.unique(knots), limits.min(axis=1, keepdims=True), limits.max(axis=1, keepdims=True))
     half, middle = np.diff(stops)[..., None] / 2, (stops[:, 1:, None] + stops[:, :-1, None]) / 2
     way = np.sign(limits[:, 1] - limits[:, 0])[:, None, None]
-    points, weights = middle + half * nodes, way * half * weights
-    # Of none at all a length of -1 could not be told.
-    shape = len(limits), points[:1].size if len(limits) else 0
-    return points.reshape(shape), weights.reshape(shape)
+    shape = len(limits), half.shape[1] * len(nodes)
+    return (middle + half * nodes).reshape(shape), (way * half * weights).reshape(shape)
 
 
 def _on_sides(cut: Crossing, face: Integers, edges: list[CutEdge]) -> tuple[Integers, Floats]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot, freeze_arrays, numbered_groups
+from gyroid_cad.common.arrays import dot, freeze_arrays, numbered_groups, signed_volumes
 from gyroid_cad.common.graph import connected
 from gyroid_cad.mesh.triangles.distances import locator_of, vtk_module
 
@@ -228,9 +228,7 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     owner = order // 3
     labels = connected(len(facets), *_neighbours(owner, first))
     opened = 2 * one_way != uses
-    # Near the triangles, so that volumes far from the origin lose no digits.
-    a, b, c = np.moveaxis(points[facets] - points.mean(axis=0), 1, 0)
-    volumes = np.bincount(labels, dot(a, np.cross(b, c)) / 6).astype(np.float64)
+    volumes = np.bincount(labels, signed_volumes(points, facets)).astype(np.float64)
     closed = np.bincount(labels[owner[first[opened]]], minlength=len(volumes)) == 0
     ranked = np.argsort(-np.abs(volumes), kind="stable")
     inwards = (closed & (volumes < 0))[ranked]
@@ -239,6 +237,7 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     for place in np.flatnonzero(inwards).tolist():
         inside[place] = _inside_another(points, facets, labels, int(ranked[place]))
     used = np.unique(facets)
+    a, b, c = np.moveaxis(points[facets], 1, 0)
     return TriangleMeasures(
         triangles=len(facets),
         vertices=len(used),

@@ -16,9 +16,7 @@ Integers = NDArray[np.int64]
 _STEP, _CUBE = 0.75, 0.15
 
 
-def spread_points(
-    a: Floats, b: Floats, c: Floats, spacing: float, face: Integers | None = None
-) -> tuple[Floats, Floats]:
+def spread_points(corners: Floats, spacing: float, face: Integers | None = None) -> tuple[Floats, Floats]:
     """Points of triangles, so that no place is further than a spacing from one; and normals there.
 
     They lie in columns on each triangle's longest side, so that a long thin one, as faces with holes are meshed by,
@@ -26,8 +24,8 @@ def spread_points(
 
     Parameters
     ----------
-    a, b, c : ndarray, shape (triangles, 3)
-        Corners, in mm.
+    corners : ndarray, shape (triangles, 3, 3)
+        In mm.
     spacing : float
         In mm.
     face : ndarray of int, shape (triangles,), optional
@@ -39,18 +37,18 @@ def spread_points(
 
     Examples
     --------
-    >>> a, b, c = np.eye(3)[:, np.newaxis]
-    >>> [len(spread_points(a, b, c, spacing)[0]) for spacing in (2.0, 1.0)]
+    >>> [len(spread_points(np.eye(3)[np.newaxis], spacing)[0]) for spacing in (2.0, 1.0)]
     [4, 5]
     """
-    face = np.zeros(len(a), dtype=np.int64) if face is None else face
-    foot, top, triangle = _columns(np.stack([a, b, c], axis=1), _STEP * spacing)
-    counts = np.ceil(np.linalg.norm(top - foot, axis=1) / (_STEP * spacing)).astype(np.int64)
+    face, step = np.zeros(len(corners), dtype=np.int64) if face is None else face, _STEP * spacing
+    foot, top, triangle = _columns(corners, step)
+    counts = np.ceil(np.linalg.norm(top - foot, axis=1) / step).astype(np.int64)
     column, number = numbered_groups(counts + 1)
     share = number / np.maximum(counts, 1)[column]
     points = foot[column] + share[:, np.newaxis] * (top - foot)[column]
     kept = _one_of_each(face[triangle[column]], points, _CUBE * spacing * 3**-0.5)
-    return points[kept], unit(np.cross(b - a, c - a))[triangle[column[kept]]]
+    normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return points[kept], normals[triangle[column[kept]]]
 
 
 def _columns(corners: Floats, step: float) -> tuple[Floats, Floats, Integers]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import signed_volumes
 from gyroid_cad.errors import ExportError
 from gyroid_cad.mesh.triangles.files import renumbered
 from gyroid_cad.mesh.triangles.measures import shell_labels, unmatched_edges
@@ -136,8 +136,7 @@ def without_chips(vertices: Floats, triangles: Integers, shells: int, least: flo
     [1, 2]
     """
     label = shell_labels(triangles)
-    a, b, c = np.moveaxis(vertices[triangles] - vertices.mean(axis=0), 1, 0)
-    volumes = np.bincount(label, dot(a, np.cross(b, c)) / 6)
+    volumes = np.bincount(label, signed_volumes(vertices, triangles))
     kept = np.abs(volumes) >= least if len(volumes) > shells else np.ones(len(volumes), dtype=np.bool_)
     solids = int(np.sum(kept & (volumes > 0)))
     if kept.all():

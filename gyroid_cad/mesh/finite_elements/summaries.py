@@ -36,6 +36,8 @@ __all__ = [
     "summary_of",
 ]
 
+# Relative, and absolute below 1: above rounding, below what tells two shapes apart.
+_ALIKE = 1e-9
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -204,8 +206,9 @@ def summary_of(name: str, values: Floats, bound: float, centres: Floats) -> Meas
     """
     kind = _KINDS[name]
     defined = values[values < NO_NUMBER]
-    worst = int(np.argmin(values) if kind.larger_is_better else np.argmax(values))
     beyond = values < bound if kind.larger_is_better else values > bound
+    badness = -values if kind.larger_is_better else values
+    worst = int(np.argmax(badness >= _alike(badness.max())))
     inside = np.clip((defined - kind.lowest) / (kind.highest - kind.lowest) * kind.bins, 0, kind.bins - 1)
     return MeasureSummary(
         smallest=float(values.min()),
@@ -220,6 +223,11 @@ def summary_of(name: str, values: Floats, bound: float, centres: Floats) -> Meas
         worst_element=worst,
         worst_place=centres[:, worst],
     )
+
+
+def _alike(badness: float) -> float:
+    """Least value that is as bad: elements that are images of each other differ by rounding, and the first is named."""
+    return badness - _ALIKE * max(abs(badness), 1.0)
 
 
 def _both(first: Quality, second: Quality) -> Quality:
@@ -251,7 +259,8 @@ def _both_summaries(
         squares = n * first.standard_deviation**2 + m * second.standard_deviation**2 + apart**2 * n * m / (n + m)
         deviation = float(np.sqrt(squares / (n + m)))
     larger_is_better = _KINDS[name].larger_is_better
-    keep = first.smallest <= second.smallest if larger_is_better else first.largest >= second.largest
+    badness = (-first.smallest, -second.smallest) if larger_is_better else (first.largest, second.largest)
+    keep = badness[0] >= _alike(badness[1])
     return replace(
         first,
         smallest=min(first.smallest, second.smallest),

@@ -30,8 +30,9 @@ _LONGEST = 12.0
 _SHORTEST = 1e-5
 # Between the directions at both ends of a step, in radians: a longer one is taken back, one of a third leads to longer.
 _TURN = 0.35
-# Of a step: so far aside of it a node may lie to end there, and so far Newton's method may move its end.
-_ASIDE, _ASTRAY = 0.08, 0.25
+# Of a step: so far aside of it a node may lie to end there, so far Newton's method may move its end, and so near the
+# curve it is left; at most so often it is moved.
+_ASIDE, _ASTRAY, _ON, _CORRECTIONS = 0.08, 0.25, 1e-3, 3
 _OUT = 1.1
 # Steps of the grid between places that are looked at first.
 _COARSE = 4
@@ -187,17 +188,20 @@ def _step(
 ) -> tuple[Floats, Floats, Floats, Booleans]:
     """Places a step further, directions there, places of the part's faces, and whether they are to be trusted."""
     half, _, near_half = _onward(pairs, pair, place + length[:, None] / 2 * onward, near)
-    tried = place + length[:, None] * half
-    near_there = near_half
-    moved = np.zeros(len(place))
-    for _ in range(3):
-        there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
-        moved = np.maximum(moved, np.linalg.norm(back, axis=1))
-        far = np.linalg.norm(back, axis=1) > length
-        back[far] *= (length[far] / np.linalg.norm(back[far], axis=1))[:, None]
-        tried = tried + back
-    there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
-    return tried, there, near_there, (moved < _ASTRAY * length) & (np.linalg.norm(back, axis=1) < 1e-3 * length)
+    tried, there, near_there = place + length[:, None] * half, half, near_half
+    moved, left = np.zeros(len(place)), np.arange(len(place))
+    for _ in range(_CORRECTIONS + 1):
+        there[left], back, near_there[left] = _onward(pairs, pair[left], tried[left], near_there[left], tangent=True)
+        distance = np.linalg.norm(back, axis=1)
+        moved[left] = np.maximum(moved[left], distance)
+        off = distance >= _ON * length[left]
+        left, back, distance = left[off], back[off], distance[off]
+        if not len(left):
+            break
+        tried[left] += back * np.minimum(1.0, length[left] / distance)[:, None]
+    sound = moved < _ASTRAY * length
+    sound[left] = False
+    return tried, there, near_there, sound
 
 
 def _hit(targets: Integers, before: Floats, after: Floats, step: Floats, ends: Ends) -> Integers:

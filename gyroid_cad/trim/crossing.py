@@ -244,8 +244,8 @@ class _Work:
             return self.made.sections[edge.number].square((t if link.forward else t[::-1])[:-1])
         # Sides of the square are straight.
         side = self.rims[face].tolist().index(edge.number)
-        t = edge.first if link.forward else edge.last
-        return np.array([square_points(side, t if self.forward[face, side] else -t)])
+        start = edge.first if link.forward else edge.last
+        return np.array([square_points(side, np.array(start if self.forward[face, side] else -start))])
 
     # The part -------------------------------------------------------------------------------------------------------
 

@@ -137,7 +137,7 @@ def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats]
 
 
 def _more_stations(counts: Integers, excess: Floats) -> Integers:
-    """Numbers of stations that are likely to be enough, as the distance goes with the fourth power; 0 if no more are."""
+    """Numbers of stations that are likely to be enough; 0 where those there are cannot be improved on."""
     order, most = np.array(_STATIONS), len(_STATIONS) - 1
     likely = counts * np.where(np.isfinite(excess), excess, 1.0) ** (1 / _ORDER)
     following = np.maximum(np.searchsorted(order, likely), np.searchsorted(order, counts, side="right"))

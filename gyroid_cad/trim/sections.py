@@ -275,7 +275,7 @@ def chord_lengths(points: Floats) -> Floats:
         return np.asarray(run / run[..., -1:])
 
 
-def spread_along(ways: Sequence[Floats], runs: Sequence[Floats], t: Floats) -> Floats:
+def spread_along(ways: Sequence[Floats] | Floats, runs: Sequence[Floats] | Floats, t: Floats) -> Floats:
     """Places of each way (k, d) at parameters t, where its own points have parameters ``runs``; shape (ways, q, d)."""
     # All in one row, each beyond the one before it.
     known = np.concatenate([np.nan_to_num(run) + 2.0 * number for number, run in enumerate(runs)])

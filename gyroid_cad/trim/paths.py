@@ -30,9 +30,10 @@ _LONGEST = 12.0
 _SHORTEST = 1e-5
 # Between the directions at both ends of a step, in radians: a longer one is taken back, one of a third leads to longer.
 _TURN = 0.35
-# Of a step: so far aside of it a node may lie to end there, so far Newton's method may move its end, and so near the
-# curve it is left; at most so often it is moved.
-_ASIDE, _ASTRAY, _ON, _CORRECTIONS = 0.08, 0.25, 1e-3, 3
+# Of a step: so far aside of it a node may lie to end there, and so far Newton's method may move its end.
+_ASIDE, _ASTRAY = 0.08, 0.25
+# At most so often that end is moved: until it is on the curve; near enough in the end, in parts of a step.
+_CORRECTIONS, _ON, _NEAR = 3, 1e-6, 1e-3
 _OUT = 1.1
 # Steps of the grid between places that are looked at first.
 _COARSE = 4
@@ -189,19 +190,17 @@ def _step(
     """Places a step further, directions there, places of the part's faces, and whether they are to be trusted."""
     half, _, near_half = _onward(pairs, pair, place + length[:, None] / 2 * onward, near)
     tried, there, near_there = place + length[:, None] * half, half, near_half
-    moved, left = np.zeros(len(place)), np.arange(len(place))
-    for _ in range(_CORRECTIONS + 1):
+    moved, off, left = np.zeros(len(place)), np.zeros(len(place)), np.arange(len(place))
+    for correction in range(_CORRECTIONS + 1):
         there[left], back, near_there[left] = _onward(pairs, pair[left], tried[left], near_there[left], tangent=True)
-        distance = np.linalg.norm(back, axis=1)
-        moved[left] = np.maximum(moved[left], distance)
-        off = distance >= _ON * length[left]
-        left, back, distance = left[off], back[off], distance[off]
-        if not len(left):
+        off[left] = np.linalg.norm(back, axis=1)
+        moved[left] = np.maximum(moved[left], off[left])
+        far = off[left] >= _ON * length[left]
+        left, back = left[far], back[far]
+        if correction == _CORRECTIONS or not len(left):
             break
-        tried[left] += back * np.minimum(1.0, length[left] / distance)[:, None]
-    sound = moved < _ASTRAY * length
-    sound[left] = False
-    return tried, there, near_there, sound
+        tried[left] += back * np.minimum(1.0, length[left] / off[left])[:, None]
+    return tried, there, near_there, (moved < _ASTRAY * length) & (off < _NEAR * length)
 
 
 def _hit(targets: Integers, before: Floats, after: Floats, step: Floats, ends: Ends) -> Integers:

@@ -33,8 +33,8 @@ _CLOSELY, _ROUGHLY = (1e-11, 1e-6), (1e-4, 1e-2)
 _BAND = 4
 # In steps between stations.
 _UNEVEN = 0.75
-# Where the distance is measured, in steps beyond each station: where a face's curvature leaps, at a knot of its maker's,
-# it is not largest halfway.
+# Where the distance is measured, in steps beyond each station: where a face's curvature leaps, at a knot of its
+# maker's, it is not largest halfway.
 _BETWEEN = np.array([0.25, 0.5, 0.75])
 # How far from its stations a curve in the square may swing between them, in the length of all.
 _WIDEST = 1.2

@@ -123,10 +123,12 @@ def seconds_of_process(*arguments: str, folder: Path | None = None) -> float:
 def fresh_python(*arguments: str, folder: Path | None = None, **environment: str) -> str:
     """Run this Python anew, with the project importable and these variables set, and give back what it printed."""
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    # Users' Pythons keep what they compiled; where this one is told not to, each start would compile the project anew.
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     process = subprocess.run(
         [sys.executable, *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": path, **environment},
+        env={**kept, "PYTHONPATH": path, **environment},
         capture_output=True,
         text=True,
         check=False,

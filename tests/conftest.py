@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol
@@ -18,6 +19,9 @@ from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 
 CELL_SIZE = 10.0
 THICKNESS = 0.8
+
+# Tests start dozens of Pythons: where this is set, each would compile the project anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # A slow machine is no reason to fail.
 hypothesis.settings.register_profile("patient", deadline=None)

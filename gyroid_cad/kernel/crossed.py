@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.Geom2d import Geom2d_BSplineCurve
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Vertex, TopoDS_Wire
@@ -41,6 +41,8 @@ Booleans = NDArray[np.bool_]
 
 # Between what was measured between stations of a section curve and what the kernel finds elsewhere along it.
 _MARGIN = 2.0
+# Of the angle between a section and an edge of the part, by which their corner reaches further.
+_SMALLEST_SINE = 1e-3
 _CORNERS = ((0, 0), (-1, 0), (-1, -1), (0, -1))
 
 
@@ -252,7 +254,31 @@ class _Realisation:
                     curve = _plane_section(self.cut.sections[edge.number].on_part)
                     self.builder.UpdateEdge(self.edge(number), curve, surface, location, self._tolerance(edge.number))
             self.builder.Add(made, self._wire(loop))
+            self._widen_corners(made, loop)
         return as_face(made.Oriented(own.Orientation()))
+
+    def _widen_corners(self, face: TopoDS_Face, loop: Uses) -> None:
+        """Let vertices reach to where a section and an edge of the part may cross beside them.
+
+        What made the part may have left its edges off their faces by a little. A section that meets such an edge at a
+        small angle crosses it some way off their common vertex, and the kernel takes it for a wire that crosses itself.
+        """
+        for (number, forward), (following, onward) in zip(loop, [*loop[1:], loop[0]], strict=True):
+            if {self.cut.edges[one].kind for one in (number, following)} != {"section", "part"}:
+                continue
+            point, direction = self._end_on(face, number, forward)
+            other_point, other = self._end_on(face, following, not onward)
+            lengths = direction.Magnitude() * other.Magnitude()
+            sine = direction.Crossed(other).Magnitude() / lengths if lengths else 0.0
+            reach = point.Distance(other_point) / max(sine, _SMALLEST_SINE)
+            edge = self.cut.edges[number]
+            self.builder.UpdateVertex(self.vertex(edge.end if forward else edge.start), _MARGIN * reach)
+
+    def _end_on(self, face: TopoDS_Face, number: int, last: bool) -> tuple[gp_Pnt, gp_Vec]:
+        """Where an edge ends, or begins, by its curve on a face, and the way it goes there."""
+        curve, point, direction = BRepAdaptor_Curve(self.edge(number), face), gp_Pnt(), gp_Vec()
+        curve.D1(curve.LastParameter() if last else curve.FirstParameter(), point, direction)
+        return point, direction
 
     def _wire(self, loop: Uses) -> TopoDS_Wire:
         wire = TopoDS_Wire()

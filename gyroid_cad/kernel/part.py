@@ -155,6 +155,8 @@ class Part:
         smallest = float(np.min(self.high - self.low))
         if self.box is not None or smallest <= enough:
             return smallest
+        if max(self._balls) > enough:
+            return max(self._balls)
         points, normals, _ = self.surface_samples(float(np.max(self.high - self.low)) / _THICKNESS_STEPS)
         chosen = np.random.default_rng(0).permutation(len(points))[:_THICKNESS_PLACES]
         points, normals = points[chosen], normals[chosen]
@@ -164,7 +166,13 @@ class Part:
         radius = enough / 2 / _AS_DEEP
         while not np.any(signed(points - radius * normals) <= band - _AS_DEEP * radius):
             radius *= _SMALLER
+        self._balls.append(2 * radius)
         return 2 * radius
+
+    @cached_property
+    def _balls(self) -> list[float]:
+        """Diameters of balls that are known to fit, in mm."""
+        return [0.0]
 
     def surface_samples(self, spacing: float) -> tuple[Floats, Floats, float]:
         """Points on the boundary, and how far at most any place on it is from the nearest of them, in mm.

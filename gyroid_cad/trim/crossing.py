@@ -239,14 +239,13 @@ class _Work:
 
     def _in_square(self, face: int, link: _Link) -> Floats:
         edge = self.made.edges[link.edge]
-        t = np.linspace(edge.first, edge.last, _OUTLINE)
-        t = (t if link.forward else t[::-1])[:-1]
         if edge.kind == "section":
-            return self.made.sections[edge.number].square(t)
-        side = int(np.flatnonzero(self.rims[face] == edge.number)[0])
-        if not self.forward[face, side]:
-            t = -t
-        return np.stack(square_points(side, t), axis=-1)
+            t = np.linspace(edge.first, edge.last, _OUTLINE)
+            return self.made.sections[edge.number].square((t if link.forward else t[::-1])[:-1])
+        # Sides of the square are straight.
+        side = self.rims[face].tolist().index(edge.number)
+        start = edge.first if link.forward else edge.last
+        return np.array([square_points(side, np.array(start if self.forward[face, side] else -start))])
 
     # The part -------------------------------------------------------------------------------------------------------
 

@@ -32,6 +32,8 @@ _SHORTEST = 1e-5
 _TURN = 0.35
 # Of a step: so far aside of it a node may lie to end there, and so far Newton's method may move its end.
 _ASIDE, _ASTRAY = 0.08, 0.25
+# At most so often that end is moved: until it is on the curve; near enough in the end, in parts of a step.
+_CORRECTIONS, _ON, _NEAR = 3, 1e-6, 1e-3
 _OUT = 1.1
 # Steps of the grid between places that are looked at first.
 _COARSE = 4
@@ -187,17 +189,18 @@ def _step(
 ) -> tuple[Floats, Floats, Floats, Booleans]:
     """Places a step further, directions there, places of the part's faces, and whether they are to be trusted."""
     half, _, near_half = _onward(pairs, pair, place + length[:, None] / 2 * onward, near)
-    tried = place + length[:, None] * half
-    near_there = near_half
-    moved = np.zeros(len(place))
-    for _ in range(3):
-        there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
-        moved = np.maximum(moved, np.linalg.norm(back, axis=1))
-        far = np.linalg.norm(back, axis=1) > length
-        back[far] *= (length[far] / np.linalg.norm(back[far], axis=1))[:, None]
-        tried = tried + back
-    there, back, near_there = _onward(pairs, pair, tried, near_there, tangent=True)
-    return tried, there, near_there, (moved < _ASTRAY * length) & (np.linalg.norm(back, axis=1) < 1e-3 * length)
+    tried, there, near_there = place + length[:, None] * half, half, near_half
+    moved, off, left = np.zeros(len(place)), np.zeros(len(place)), np.arange(len(place))
+    for correction in range(_CORRECTIONS + 1):
+        there[left], back, near_there[left] = _onward(pairs, pair[left], tried[left], near_there[left], tangent=True)
+        off[left] = np.linalg.norm(back, axis=1)
+        moved[left] = np.maximum(moved[left], off[left])
+        far = off[left] >= _ON * length[left]
+        left, back = left[far], back[far]
+        if correction == _CORRECTIONS or not len(left):
+            break
+        tried[left] += back * np.minimum(1.0, length[left] / off[left])[:, None]
+    return tried, there, near_there, (moved < _ASTRAY * length) & (off < _NEAR * length)
 
 
 def _hit(targets: Integers, before: Floats, after: Floats, step: Floats, ends: Ends) -> Integers:

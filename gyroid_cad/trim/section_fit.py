@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import grouped
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.trim.lattice_faces import Pairs
@@ -19,15 +20,22 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
-_STATIONS = (8, 16, 32, 64, 128)
+_STATIONS = (8, 12, 16, 20, 24, 28, 32, 40, 48, 64, 96, 128)
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
-# Steps of Newton's method; how short the last is in the square, and in parts of the ranges of the part's parameters,
-# where its square is what is left.
-_NEWTON_STEPS, _CONVERGED, _ASIDE = 12, 1e-11, 1e-6
+# With what power of their number the distance falls.
+_ORDER = 4
+# Steps of Newton's method.
+_NEWTON_STEPS = 12
+# How short the last is in the square, and in parts of the ranges of the part's parameters, where its square is what is
+# left: of stations to fit, and of those by which they are spread.
+_CLOSELY, _ROUGHLY = (1e-11, 1e-6), (1e-4, 1e-2)
 # So many functions on either side of its own do not vanish at a station that is nearly in its even place.
 _BAND = 4
 # In steps between stations.
 _UNEVEN = 0.75
+# Where the distance is measured, in steps beyond each station: where a face's curvature leaps, at a knot of its
+# maker's, it is not largest halfway.
+_BETWEEN = np.array([0.25, 0.5, 0.75])
 # How far from its stations a curve in the square may swing between them, in the length of all.
 _WIDEST = 1.2
 _AT_ONCE = 256
@@ -118,17 +126,26 @@ def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats]
     """Control points, in the square, in space and on the part's face, and how far the three are apart."""
     control: list[Floats] = [np.zeros((0, 7))] * len(paths.pair)
     deviation = np.full(len(paths.pair), np.inf)
-    left = np.arange(len(paths.pair))
-    for count in _STATIONS:
-        for some in np.split(left, range(_AT_ONCE, len(left), _AT_ONCE)):
-            if len(some):
-                made, off = _fitted(pairs, paths, some, count)
+    counts = np.full(len(paths.pair), _STATIONS[0])
+    while np.any(counts):
+        for count, left in grouped(counts):
+            if not count:
+                continue
+            for some in np.split(left, range(_AT_ONCE, len(left), _AT_ONCE)):
+                made, deviation[some] = _fitted(pairs, paths, some, count)
                 for index, path in enumerate(some.tolist()):
-                    control[path], deviation[path] = made[index], off[index]
-        left = left[~(deviation[left] <= _CLOSE * cell_size)]
-        if not len(left):
-            break
+                    control[path] = made[index]
+        counts = _more_stations(counts, deviation / (_CLOSE * cell_size))
     return control, deviation
+
+
+def _more_stations(counts: Integers, excess: Floats) -> Integers:
+    """Numbers of stations that are likely to be enough; 0 where those there are cannot be improved on."""
+    order, most = np.array(_STATIONS), len(_STATIONS) - 1
+    likely = counts * np.where(np.isfinite(excess), excess, 1.0) ** (1 / _ORDER)
+    following = np.maximum(np.searchsorted(order, likely), np.searchsorted(order, counts, side="right"))
+    done = (excess <= 1) | (counts == order[-1]) | (counts == 0)
+    return np.where(done, 0, order[np.minimum(following, most)])
 
 
 def _parted(pairs: Pairs, paths: Paths, which: Integers, first: int) -> tuple[Paths, list[Floats]]:
@@ -140,7 +157,7 @@ def _parted(pairs: Pairs, paths: Paths, which: Integers, first: int) -> tuple[Pa
     for path in which.tolist():
         pair, start, end = int(paths.pair[path]), int(paths.start[path]), int(paths.end[path])
         way = np.hstack([paths.places[path], paths.near[path]])
-        even = spread_along(way, chord_lengths(way[:, :2]), np.linspace(0, 1, 2 * _HALF + 1))[np.newaxis]
+        even = spread_along([way], [chord_lengths(way[:, :2])], np.linspace(0, 1, 2 * _HALF + 1))
         found, even = _onto_curve(pairs, np.array([pair]), even, even[:, [0, -1]])
         node = first + len(points)
         points.append(found[0, _HALF])
@@ -158,13 +175,11 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     pair = paths.pair[which]
     ways = [np.hstack([paths.places[k], paths.near[k]]) for k in which.tolist()]
     ends = np.array([[way[0], way[-1]] for way in ways])
-    stations = np.array([spread_along(way, chord_lengths(way[:, :2]), even) for way in ways])
+    stations = spread_along(ways, [chord_lengths(way[:, :2]) for way in ways], even)
+    points, stations = _onto_curve(pairs, pair, stations, ends, _ROUGHLY)
+    stations = spread_along(stations, chord_lengths(points), even)
     points, stations = _onto_curve(pairs, pair, stations, ends)
-    stations = np.array(
-        [spread_along(way, chord_lengths(some), even) for way, some in zip(stations, points, strict=True)]
-    )
-    points, stations = _onto_curve(pairs, pair, stations, ends)
-    t = np.array([chord_lengths(some) for some in points])
+    t = chord_lengths(points)
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(which), count + 1, count + 1)
     # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney):
     # nearly even ones do.
@@ -172,7 +187,8 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     crowded |= np.abs(t - even).max(axis=1) * count > _UNEVEN
     through[crowded] = np.eye(count + 1)
     control = _solved(through, np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1))
-    between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
+    looked_at = (even[:-1, None] + even[1] * _BETWEEN).ravel()
+    between = basis(section_knots(count + 1), 3, looked_at) @ control
     astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
     u, v = np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1)
     exact = pairs.faces.derivatives(pairs.face[pair], u, v, 0)[0]
@@ -182,8 +198,11 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     return control, np.where(crowded | astray | ~np.isfinite(deviation), np.inf, deviation)
 
 
-def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) -> tuple[Floats, Floats]:
+def _onto_curve(
+    pairs: Pairs, pair: Integers, stations: Floats, ends: Floats, closely: tuple[float, float] = _CLOSELY
+) -> tuple[Floats, Floats]:
     """Points of stations moved onto the curve, and those stations; the first and last are what they are."""
+    converged, astray = closely
     stations = stations.copy()
     stations[:, [0, -1]] = ends
     points = np.zeros((*stations.shape[:2], 3))
@@ -196,7 +215,7 @@ def _onto_curve(pairs: Pairs, pair: Integers, stations: Floats, ends: Floats) ->
         step[:, [0, -1]] = 0
         length = np.linalg.norm(step, axis=-1, keepdims=True)
         aside = np.abs(near - some[..., 2:]) / ranges[left, None]
-        moving = (length.max(axis=(1, 2)) >= _CONVERGED) | (aside.max(axis=(1, 2)) >= _ASIDE)
+        moving = (length.max(axis=(1, 2)) >= converged) | (aside.max(axis=(1, 2)) >= astray)
         some[moving, :, :2] += (step * np.minimum(1.0, 0.1 / np.maximum(length, 0.1)))[moving]
         some[..., 2:] = near
         stations[left] = some

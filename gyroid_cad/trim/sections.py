@@ -8,6 +8,7 @@ curve in the square and one for that in space, with the same parameter.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -233,16 +234,14 @@ def _fitted(
 ) -> tuple[Floats, Floats, Floats]:
     """Control points in the square and in space, and how far the two curves are from each other."""
     even = np.linspace(0, 1, count + 1)
-    stations = np.array([spread_along(way, chord_lengths(way), even) for way in ways])
+    stations = spread_along(ways, [chord_lengths(way) for way in ways], even)
     points = _onto_level(faces, face, plane, stations)
     # Evenly spread in the square, then in space.
-    stations = np.array(
-        [spread_along(way, chord_lengths(some), even) for way, some in zip(stations, points, strict=True)]
-    )
+    stations = spread_along(stations, chord_lengths(points), even)
     stations[:, [0, -1]] = [[way[0], way[-1]] for way in ways]
     points = _onto_level(faces, face, plane, stations)
     # Parameters by chord length: nearly even, and smooth however the stations are not quite so.
-    t = np.array([chord_lengths(some) for some in points])
+    t = chord_lengths(points)
     through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
     # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
     crowded = ~np.all(np.isfinite(t), axis=1)
@@ -270,12 +269,15 @@ def _onto_level(faces: FacesToCut, face: Integers, plane: Integers, stations: Fl
 
 
 def chord_lengths(points: Floats) -> Floats:
-    """Length of the chords up to each point, in parts of all; not numbers if there is none."""
-    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    """Length of the chords up to each of points (..., k, d), in parts of all; not numbers if there is none."""
+    run = np.cumsum(np.linalg.norm(np.diff(points, axis=-2, prepend=points[..., :1, :]), axis=-1), axis=-1)
     with np.errstate(invalid="ignore"):
-        return np.asarray(run / run[-1])
+        return np.asarray(run / run[..., -1:])
 
 
-def spread_along(way: Floats, run: Floats, t: Floats) -> Floats:
-    """Places of a way (k, d) at parameters t, where its own points have parameters ``run``; shape (q, d)."""
-    return np.stack([np.interp(t, run, column) for column in way.T], axis=-1)
+def spread_along(ways: Sequence[Floats] | Floats, runs: Sequence[Floats] | Floats, t: Floats) -> Floats:
+    """Places of each way (k, d) at parameters t, where its own points have parameters ``runs``; shape (ways, q, d)."""
+    # All in one row, each beyond the one before it.
+    known = np.concatenate([np.nan_to_num(run) + 2.0 * number for number, run in enumerate(runs)])
+    asked = t + 2.0 * np.arange(len(ways))[:, np.newaxis]
+    return np.stack([np.interp(asked, known, column) for column in np.concatenate(ways).T], axis=-1)

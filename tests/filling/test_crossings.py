@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from itertools import pairwise
 from math import pi
 from typing import Any
 
@@ -11,8 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.BRepGProp import BRepGProp
+from OCP.Geom import Geom_BSplineCurve
+from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
+from OCP.TColgp import TColgp_Array1OfPnt
+from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
 
 import gyroid_cad.filling.part
 import gyroid_cad.filling.roads
@@ -21,6 +27,8 @@ from gyroid_cad.filling.fill import fill
 from gyroid_cad.filling.report import FillReport
 from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.pieces import Crossing
+from gyroid_cad.trim.sections import on_section
 
 COARSE = FitSettings(5)
 
@@ -50,6 +58,22 @@ def vase() -> cq.Workplane:
 
 def filleted() -> cq.Workplane:
     return cq.Workplane().box(8, 7, 6).edges("|Z").fillet(1.5).edges(">Z").fillet(0.8)
+
+
+def leaping() -> cq.Workplane:
+    """A profile of three cubics whose curvature leaps where they meet, extruded."""
+    poles = [(0, 0), (0.7, 1.2), (1.5, 1.8), (2.1, 2.25), (3.2, 1), (3.9, 1.6), (4.3, 1.95), (5, 0.2)]
+    knots, multiplicities = [0.0, 0.45, 0.55, 1.0], [4, 2, 2, 4]
+    points, values, times = TColgp_Array1OfPnt(1, 8), TColStd_Array1OfReal(1, 4), TColStd_Array1OfInteger(1, 4)
+    for number, (x, y) in enumerate(poles, 1):
+        points.SetValue(number, gp_Pnt(x, y, 0))
+    for number, (knot, multiplicity) in enumerate(zip(knots, multiplicities, strict=True), 1):
+        values.SetValue(number, knot)
+        times.SetValue(number, multiplicity)
+    top = cq.Edge(BRepBuilderAPI_MakeEdge(Geom_BSplineCurve(points, values, times, 3)).Edge())
+    corners = [cq.Vector(*corner) for corner in ((5, 0.2), (5, -2), (0, -2), (0, 0))]
+    border = cq.Wire.assembleEdges([top, *(cq.Edge.makeLine(a, b) for a, b in pairwise(corners))])
+    return cq.Workplane(cq.Solid.extrudeLinear(border, [], cq.Vector(0, 0, 1)))
 
 
 # Of each kind of surface one.
@@ -177,3 +201,25 @@ def test_numbers_of_nodes_do_not_depend_on_where_the_part_stands() -> None:
     assert (near.faces, near.solids) == (far.faces, far.solids)
     assert near.volume == pytest.approx(far.volume, rel=1e-8)
     assert np.isfinite(far.area)
+
+
+def test_sections_are_as_near_to_both_faces_as_is_said_where_a_faces_curvature_leaps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cuts: list[Crossing] = []
+    cross_part = gyroid_cad.filling.roads.cross_part
+
+    def kept(*arguments: Any, **options: Any) -> Crossing:
+        cuts.append(cross_part(*arguments, **options))
+        return cuts[-1]
+
+    monkeypatch.setattr(gyroid_cad.filling.roads, "cross_part", kept)
+    fill(leaping(), 2.9, density=0.3, fit=COARSE)
+    (cut,) = cuts
+    t = np.linspace(0, 1, 501)
+    for section in cut.sections:
+        face, part = cut.pairs.face[[section.pair]], cut.pairs.part[[section.pair]]
+        points, (u, v) = on_section(section.in_space, t), section.square(t).T[:, np.newaxis]
+        on_faces = cut.faces.derivatives(face, u, v, 0)[0][0], cut.boundary.points(part, section.part(t)[None])[0]
+        for exact in on_faces:
+            assert np.linalg.norm(exact - points, axis=1).max() <= 1.25 * section.deviation + 1e-12

@@ -275,7 +275,7 @@ class _Realisation:
             self.builder.UpdateVertex(self.vertex(edge.end if forward else edge.start), _MARGIN * reach)
 
     def _end_on(self, face: TopoDS_Face, number: int, last: bool) -> tuple[gp_Pnt, gp_Vec]:
-        """Where an edge ends, or begins, by its curve on a face, and the way it goes there."""
+        """Point where an edge ends, or begins, by its curve on a face, and the way it goes there."""
         curve, point, direction = BRepAdaptor_Curve(self.edge(number), face), gp_Pnt(), gp_Vec()
         curve.D1(curve.LastParameter() if last else curve.FirstParameter(), point, direction)
         return point, direction

@@ -101,7 +101,7 @@ class TrianglePart:
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,)."""
-        return np.asarray(self.distances(points) < 0)
+        return self.facets.inside(points) if self.depth is None else np.asarray(self.distances(points) < 0)
 
     def near(self, points: Floats, reach: Floats | float) -> Booleans:
         """Mask of the points that lie inside or within a reach of it, in mm."""

@@ -258,13 +258,12 @@ class Inside:
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,)."""
-        distances = self._distances(points)
-        inside = distances < 0
-        for index in np.flatnonzero(np.abs(distances) < self._band).tolist():
+        inside = self._distances.inside(points)
+        for index in np.flatnonzero(self._distances.near(points, self._band)).tolist():
             # It takes some places for ones on the boundary that are not: these the triangles tell.
             if (state := _state(self._classifier, points[index])) in (TopAbs_IN, TopAbs_OUT):
                 inside[index] = state == TopAbs_IN
-        return np.asarray(inside)
+        return inside
 
 
 def points_on(face: TopoDS_Face, count: int) -> Floats:

@@ -115,9 +115,7 @@ class Part:
         signed, band = self._signed_distances
         if signed is None:
             return self._classified(points)
-        distances = signed(points)
-        inside: Booleans = distances < 0
-        near = np.flatnonzero(np.abs(distances) <= band)
+        inside, near = signed.inside(points), np.flatnonzero(signed.near(points, band))
         inside[near] = self._classified(points[near])
         return inside
 

@@ -9,18 +9,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import numbered_groups
 from gyroid_cad.errors import GyroidError
+from gyroid_cad.mesh.triangles.spread import spread_points
 
 __all__ = ["SignedDistances", "Windings", "locator_of", "vtk_module"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
 
 # Lines run along no direction that a part was drawn by.
 _TURN = np.linalg.qr(np.array([[1.0, 0.31, 0.17], [-0.23, 1.0, 0.41], [0.37, -0.29, 1.0]]))[0]
 _PAIRS_AT_ONCE = 2**19
+# So many points are worth spreading others over the triangles, of which so many lie along the side of a square of the
+# triangles' area.
+_MANY, _SPREAD = 1000, 150
 _ROUNDING = 1e-12
 
 
@@ -75,6 +81,34 @@ class SignedDistances:
         self._function.FunctionValue(support.numpy_to_vtk(np.array(points, dtype=float, order="C")), found)
         return np.asarray(np.abs(support.vtk_to_numpy(found)))
 
+    def inside(self, points: Floats) -> Booleans:
+        """Mask of the points, shape (n, 3), that the triangles go round; distances, which take longer, are not asked.
+
+        >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+        >>> SignedDistances(corners, sides).inside(np.array([[0.1, 0.2, 0.3], [0.2, 0.2, -2.0]])).tolist()
+        [True, False]
+        """
+        return np.asarray(self._turns(points) > 0)
+
+    def near(self, points: Floats, reach: float) -> Booleans:
+        """Mask of the points, shape (n, 3), that are no further from the triangles than a reach in mm.
+
+        Of many, most are told by the nearest of points spread over the triangles.
+
+        >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        >>> SignedDistances(corners, np.array([[0, 1, 2]])).near(np.array([[0.2, 0.3, -2.0], [0.2, 0.3, 0.5]]), 1.0)
+        array([False,  True])
+        """
+        if len(points) < _MANY:
+            return np.asarray(self.away(points) <= reach)
+        tree, spacing = self._spread
+        apart = tree.query(points, distance_upper_bound=reach + spacing)[0]
+        found: Booleans = np.asarray(apart <= reach)
+        doubtful = np.flatnonzero(np.isfinite(apart) & ~found)
+        found[doubtful] = self.away(points[doubtful]) <= reach
+        return found
+
     def nearest(self, points: Floats) -> Floats:
         """Places on the triangles that are nearest to points, shape (n, 3), in mm; shape (n, 3).
 
@@ -90,6 +124,15 @@ class SignedDistances:
             self._locator.FindClosestPoint(point, place, cell, number, part, square)
             found[index] = place
         return found
+
+    @cached_property
+    def _spread(self) -> tuple[cKDTree, float]:
+        """Points spread over the triangles, and how far any place of those is from the nearest one at most, in mm."""
+        vertices, triangles = self._surface
+        corners = vertices[triangles]
+        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        spacing = float(np.sqrt(np.linalg.norm(sides, axis=1).sum() / 2)) / _SPREAD
+        return cKDTree(spread_points(corners, spacing)[0]), spacing * (1 + _ROUNDING)
 
     @cached_property
     def _turns(self) -> Windings:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial import ConvexHull
@@ -40,3 +40,14 @@ def test_two_bodies_one_in_the_other_are_gone_round_twice() -> None:
     assert Windings(both, nested)(points).tolist() == [2, 1, 0, 0]
     assert Windings(both, np.concatenate([sides[:, ::-1], sides + 4]))(points).tolist() == [0, 1, 0, 0]
     assert Windings(both, nested)(points[:0]).tolist() == []
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**32 - 1), st.floats(0.01, 3), st.floats(1e-3, 1))
+def test_whether_points_are_near_is_told_of_many_as_of_few(seed: int, reach: float, flat: float) -> None:
+    random = np.random.default_rng(seed)
+    triangles = random.normal(size=(30, 3, 3)) * [4, 1, flat]
+    distances = SignedDistances(triangles.reshape(-1, 3), np.arange(90).reshape(-1, 3))
+    points = random.normal(size=(1200, 3)) * 4
+    few = np.concatenate([distances.near(some, reach) for some in np.split(points, 4)])
+    assert np.array_equal(distances.near(points, reach), few)

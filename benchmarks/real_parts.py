@@ -58,8 +58,9 @@ WAYS: dict[str, tuple[str, tuple[str, ...]]] = {
     "channels-step": ("step", ("--kind", "channels")),
 }
 _USUAL_WAYS = ("plain-step", "plain-stl", "triangles-stl", "skin-step", "skin-stl")
-# Of the estimate: points in the part, few ones, and the mesh of it in parts of its longest side and in radians.
-_POINTS, _FEW_POINTS, _DEVIATION, _ANGLE = 1_500_000, 50_000, 2e-4, 0.1
+# Of the estimate: points in the part, few ones, and the mesh of it in parts of its longest side and in radians:
+# twice as coarse, it held 0.4 % less than a swept part.
+_POINTS, _FEW_POINTS, _DEVIATION, _ANGLE = 1_500_000, 50_000, 1e-4, 0.04
 _CHECK_SECONDS = 300
 
 

@@ -26,7 +26,7 @@ _TURN = np.linalg.qr(np.array([[1.0, 0.31, 0.17], [-0.23, 1.0, 0.41], [0.37, -0.
 _PAIRS_AT_ONCE = 2**19
 # So many points are worth spreading others over the triangles, of which so many lie along the side of a square of the
 # triangles' area.
-_MANY, _SPREAD = 1000, 150
+_MANY, _SPREAD = 10_000, 150
 _ROUNDING = 1e-12
 
 
@@ -61,7 +61,7 @@ class SignedDistances:
         points, facets = np.array(vertices, dtype=float, order="C"), np.array(triangles, dtype=np.int64, order="C")
         self._function = vtk_module("vtkFiltersCore").vtkImplicitPolyDataDistance()
         self._function.SetInput(_poly_data(points, facets))
-        self._surface = points, facets
+        self._surface, self._asked = (points, facets), 0
 
     def __call__(self, points: Floats) -> Floats:
         """Signed distances of points, shape (n, 3), in mm; shape (n,)."""
@@ -94,13 +94,14 @@ class SignedDistances:
     def near(self, points: Floats, reach: float) -> Booleans:
         """Mask of the points, shape (n, 3), that are no further from the triangles than a reach in mm.
 
-        Of many, most are told by the nearest of points spread over the triangles.
+        Once many were asked, most are told by the nearest of points spread over the triangles.
 
         >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
         >>> SignedDistances(corners, np.array([[0, 1, 2]])).near(np.array([[0.2, 0.3, -2.0], [0.2, 0.3, 0.5]]), 1.0)
         array([False,  True])
         """
-        if len(points) < _MANY:
+        self._asked += len(points)
+        if self._asked < _MANY:
             return np.asarray(self.away(points) <= reach)
         tree, spacing = self._spread
         apart = tree.query(points, distance_upper_bound=reach + spacing)[0]

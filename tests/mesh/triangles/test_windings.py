@@ -48,6 +48,5 @@ def test_whether_points_are_near_is_told_of_many_as_of_few(seed: int, reach: flo
     random = np.random.default_rng(seed)
     triangles = random.normal(size=(30, 3, 3)) * [4, 1, flat]
     distances = SignedDistances(triangles.reshape(-1, 3), np.arange(90).reshape(-1, 3))
-    points = random.normal(size=(1200, 3)) * 4
-    few = np.concatenate([distances.near(some, reach) for some in np.split(points, 4)])
-    assert np.array_equal(distances.near(points, reach), few)
+    points = random.normal(size=(12_000, 3)) * 4
+    assert np.array_equal(distances.near(points, reach)[:2000], distances.away(points[:2000]) <= reach)

@@ -133,7 +133,10 @@ class SignedDistances:
         corners = vertices[triangles]
         sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         spacing = float(np.sqrt(np.linalg.norm(sides, axis=1).sum() / 2)) / _SPREAD
-        return cKDTree(spread_points(corners, spacing)[0]), spacing * (1 + _ROUNDING)
+        # No place of a triangle is further from one of its corners than the longest of its sides is long.
+        wide = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1) > spacing
+        points = np.concatenate([vertices, spread_points(corners[wide], spacing)[0]])
+        return cKDTree(points), spacing * (1 + _ROUNDING)
 
     @cached_property
     def _turns(self) -> Windings:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cadquery as cq
 import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeTorus
@@ -29,6 +28,7 @@ def test_a_piece_of_a_ring_lies_in_its_box(first: float, last: float) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_an_extruded_spline_lies_in_its_box(seed: int) -> None:
+    cq = pytest.importorskip("cadquery", reason="no CadQuery for this kernel")
     random = np.random.default_rng(seed)
     spline = cq.Edge.makeSpline([cq.Vector(*place) for place in random.uniform(-9, 9, (5, 2))], periodic=True)
     prism = BRepPrimAPI_MakePrism(spline.wrapped, gp_Vec(0, 0, 3)).Shape()

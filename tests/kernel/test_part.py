@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cadquery as cq
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -138,6 +137,7 @@ def test_sampling_leaves_no_triangles_on_the_users_part() -> None:
 
 
 def test_the_volume_of_a_vase_is_that_of_the_discs_it_is_made_of() -> None:
+    cq = pytest.importorskip("cadquery", reason="no CadQuery for this kernel")
     profile = cq.Workplane("XZ").lineTo(6, 0).spline([(4, 4), (3, 8), (5, 12), (9, 18), (8, 26)], includeCurrent=True)
     profile = profile.lineTo(0, 26).close()
     (curve,) = (edge for edge in profile.val().Edges() if edge.geomType() == "BSPLINE")

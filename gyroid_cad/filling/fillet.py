@@ -188,7 +188,7 @@ def rounded(void: Body, part: Body, core: Body, skin: float | None, radius: floa
 def _on(part: Body, points: Floats) -> Booleans:
     """Mask of points that lie on a part's boundary."""
     size = float(np.ptp(part.bounds, axis=0).max())
-    return SignedDistances(*part.triangles()).away(points) < AS_FAR * size
+    return SignedDistances(*part.triangles()).near(points, AS_FAR * size)
 
 
 def _junction(

@@ -66,7 +66,7 @@ class SignedDistances:
     def __call__(self, points: Floats) -> Floats:
         """Signed distances of points, shape (n, 3), in mm; shape (n,)."""
         away = self.away(points)
-        return np.asarray(np.where(self._turns(points) > 0, -away, away))
+        return np.asarray(np.where(self.inside(points), -away, away))
 
     def away(self, points: Floats) -> Floats:
         """Distances without a sign, which triangles that are not closed have too.

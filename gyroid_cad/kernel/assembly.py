@@ -25,8 +25,8 @@ from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
 from gyroid_cad.kernel.step import product_name, reading_step, write_parts
-from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart
 from gyroid_cad.kernel.step_solids import read_step_bodies
+from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 

@@ -31,7 +31,8 @@ from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import Topology, parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import UnknownGeometryError
-from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart, products_of, time_stamp, write_products
+from gyroid_cad.kernel.step_solids import products_of
+from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart, time_stamp, write_products
 from gyroid_cad.version import __version__
 
 __all__ = [

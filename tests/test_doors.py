@@ -202,6 +202,10 @@ CASES: dict[str, dict[str, Case]] = {
             {"file": "made.stl", "trim": "box", "deviation": 0.5, "angle": 80},
             sized,
         ),
+        "kernel check": Case(
+            {"file": "made.step", "kernel check": True},
+            lambda made, usual: made.file.read_bytes().count(b"=ADVANCED_FACE(") == made.faces,
+        ),
         "instances": Case(
             {"file": "made.step", "cells": (2, 1, 1), "instances": True},
             lambda made, usual: made.file.read_bytes().count(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE(") == 2,

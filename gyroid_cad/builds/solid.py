@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.choices import CheckedBy, Schema
 from gyroid_cad.common.formats import BREP, FILE_BYTES_PER_CELL, STEP, STL, format_of
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
@@ -61,6 +61,8 @@ class Build:
     seconds : dict
         By stage.
     """
+
+    checked_by: CheckedBy = "kernel"
 
     def __init__(self, fitted: FittedWall, progress: Progress | None) -> None:
         self.fitted = fitted

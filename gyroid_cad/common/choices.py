@@ -17,6 +17,7 @@ __all__ = [
     "SCHEMAS",
     "SURFACE_NAMES",
     "TRIMS",
+    "CheckedBy",
     "FitName",
     "Kind",
     "Route",
@@ -32,6 +33,8 @@ Trim = Literal["box"]
 Route = Literal["brep", "triangles"]
 # Of STEP files.
 Schema = Literal["ap214", "ap242"]
+# Of what is announced as valid: by the numbers of edges and the control nets, or by the kernel.
+CheckedBy = Literal["nets", "kernel"]
 # On the command line, where no FitSettings can be given.
 FitName = Literal["smooth", "paper"]
 

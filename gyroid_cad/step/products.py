@@ -15,7 +15,7 @@ from gyroid_cad.step.geometry import AxisPlacement
 from gyroid_cad.step.text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
 
-__all__ = ["Occurrence", "ShapeSize", "StepPart", "time_stamp", "write_products"]
+__all__ = ["Occurrence", "ShapeSize", "StepPart", "product_name", "time_stamp", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -128,6 +128,12 @@ def write_products(
         if size is not None:
             products.validate(whole, size)
         out.write(b"ENDSEC;\nEND-ISO-10303-21;\n")
+
+
+def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
+    """The name, or the file's stem, in characters that ISO 10303-21 takes as they are: the kernel escapes none."""
+    wanted = Path(path).stem if name is None else name
+    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
 
 
 def time_stamp() -> str:

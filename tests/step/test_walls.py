@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from gyroid_cad.kernel.check import is_valid, measure, topology
-from gyroid_cad.kernel.step import read_step, topology_in_step
+from gyroid_cad.kernel.step import read_step
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.step.counts import topology_in_step
 from gyroid_cad.step.products import StepPart, write_products
 from gyroid_cad.step.walls import wall_bodies
 from gyroid_cad.surface.fit import FitSettings

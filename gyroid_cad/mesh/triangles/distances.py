@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import numbered_groups
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.mesh.triangles.spread import spread_points
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 __all__ = ["SignedDistances", "Windings", "locator_of", "vtk_module"]
 
@@ -129,6 +131,9 @@ class SignedDistances:
     @cached_property
     def _spread(self) -> tuple[cKDTree, float]:
         """Points spread over the triangles, and how far any place of those is from the nearest one at most, in mm."""
+        # Whoever asks no distances does not wait for it: it takes longer than building a lattice of some cells.
+        from scipy.spatial import cKDTree
+
         vertices, triangles = self._surface
         corners = vertices[triangles]
         sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

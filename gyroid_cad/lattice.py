@@ -210,9 +210,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         """Write files; each path's ending chooses STEP (.step, .stp), BREP, STL, 3MF, OBJ or PLY.
 
         Every path and setting is checked before anything is built. A file appears whole or not at all. STEP, STL and
-        3MF of whole patches are made straight from the control nets, without the kernel: that every edge bounds two
-        faces, that these have their borders in common and enclose what is between them is checked by numbers. STEP and
-        STL are streamed; the others are in memory as a whole while they are written.
+        3MF of whole patches are made straight from the control nets, without the kernel, and checked by the numbers of
+        their edges. STEP and STL are streamed; the others are in memory as a whole while they are written.
 
         Parameters
         ----------

@@ -28,8 +28,8 @@ from gyroid_cad.common.formats import BREP, PART_FORMATS, format_of, listed_endi
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
+    from gyroid_cad.builds.report import LatticeReport
     from gyroid_cad.builds.triangles import TriangleReport
-    from gyroid_cad.lattice import LatticeReport
 
 __all__ = ["build_command"]
 

@@ -28,7 +28,7 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, 
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid, as_wire
 from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement
-from gyroid_cad.step.bodies import LEAST_GAP, StepBody, StepFace, StepLoop, Use
+from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
 from gyroid_cad.step.products import Occurrence, StepPart
 
 __all__ = ["products_of", "read_step_bodies", "require_bodies"]
@@ -152,7 +152,7 @@ class _Reading:
         pole = next(edge for edge in edges if BRep_Tool.Degenerated_s(edge))
         return StepLoop([], self._vertex(TopExp.FirstVertex_s(pole)))
 
-    def _closed_loops(self, uses: list[Use]) -> list[StepLoop]:
+    def _closed_loops(self, uses: list[EdgeUse]) -> list[StepLoop]:
         """Join uses end to end."""
         left, loops = list(uses), []
         while left:
@@ -166,17 +166,17 @@ class _Reading:
             loops.append(StepLoop(loop))
         return loops
 
-    def _ends(self, use: Use) -> tuple[int, int]:
+    def _ends(self, use: EdgeUse) -> tuple[int, int]:
         """Vertices where a use of an edge begins and ends."""
         first, last, _ = self.read.edges[use[0]]
         return (first, last) if use[1] else (last, first)
 
-    def _joined(self, uses: list[Use]) -> bool:
+    def _joined(self, uses: list[EdgeUse]) -> bool:
         """Tell whether every edge ends where the next begins."""
         ends = [self._ends(use) for use in uses]
         return all(end == start for (_, end), (start, _) in zip(ends, [*ends[1:], ends[0]], strict=True))
 
-    def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:
+    def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> EdgeUse:
         along, known = _along(edge), self._edges.Extent()
         number = int(self._edges.Add(edge))
         self._meet(BRep_Tool.Tolerance_s(edge), edge, face)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gyroid_cad.step.geometry import Geometry, Placed, Spline, Triple
 from gyroid_cad.step.text import StepText, quoted, refs
 
-__all__ = ["LEAST_GAP", "Body", "StepBody", "StepFace", "StepLoop", "Use", "write_shells"]
+__all__ = ["LEAST_GAP", "EdgeUse", "StepBody", "StepFace", "StepLoop", "WritableBody", "write_shells"]
 
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
@@ -20,11 +20,11 @@ Booleans = NDArray[np.bool_]
 # In mm: the kernel's smallest distance, which no tolerance is below.
 LEAST_GAP = 1e-7
 # Of an edge: its number, and whether it is run from its first vertex to its last.
-Use = tuple[int, bool]
+EdgeUse = tuple[int, bool]
 
 
-class Body(Protocol):
-    """What a STEP file can hold as a solid, or as a shell that bounds none."""
+class WritableBody(Protocol):
+    """Solid that a STEP file can hold, or shell that bounds none."""
 
     @property
     def gap(self) -> float:
@@ -53,7 +53,7 @@ class StepLoop:
         Instead of them, where the border is a point.
     """
 
-    uses: list[Use]
+    uses: list[EdgeUse]
     vertex: int | None = None
 
 

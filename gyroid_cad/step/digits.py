@@ -51,8 +51,8 @@ def decimal_text(values: Floats, decimals: int) -> Bytes:
     Parameters
     ----------
     values : ndarray, shape (...)
-        Below 1e8 times, with so many decimals, what 64 bits hold.
     decimals : int
+        At most 15.
 
     Returns
     -------
@@ -65,8 +65,11 @@ def decimal_text(values: Floats, decimals: int) -> Bytes:
     """
     full, _, without_trailing = _tables()
     count = -(-decimals // _DIGITS)
-    scaled = np.rint(values * 10.0**decimals).astype(np.int64)
-    whole, rest = np.divmod(np.abs(scaled), 10**decimals)
+    # What comes after the point is multiplied alone, so that nothing is lost by it.
+    part, before = np.modf(np.abs(values))
+    rest = np.rint(part * 10.0**decimals).astype(np.int64)
+    whole, rest = before.astype(np.int64) + rest // 10**decimals, rest % 10**decimals
+    negative = (values < 0) & ((whole > 0) | (rest > 0))
     rest *= 10 ** (count * _DIGITS - decimals)
     chunks = []
     for _ in range(count):
@@ -76,7 +79,7 @@ def decimal_text(values: Floats, decimals: int) -> Bytes:
     for chunk in chunks:
         shown.append(np.where(ended[..., np.newaxis], full[chunk], without_trailing[chunk]))
         ended |= chunk > 0
-    sign = np.where(scaled < 0, _MINUS, 0).astype(np.uint8)[..., np.newaxis]
+    sign = np.where(negative, _MINUS, 0).astype(np.uint8)[..., np.newaxis]
     point = np.full((*values.shape, 1), _POINT, dtype=np.uint8)
     return np.concatenate([sign, integer_text(whole), point, *reversed(shown)], axis=-1)
 

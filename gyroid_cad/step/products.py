@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.step.bodies import LEAST_GAP, Body
+from gyroid_cad.step.bodies import LEAST_GAP, WritableBody
 from gyroid_cad.step.geometry import AxisPlacement
 from gyroid_cad.step.text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
@@ -62,7 +62,7 @@ class StepPart:
     Attributes
     ----------
     name : str
-    bodies : sequence of Body
+    bodies : sequence of WritableBody
     colour : str
         By which STEP knows it; that of the file's reader if left out.
     body_names : sequence of str
@@ -73,7 +73,7 @@ class StepPart:
     """
 
     name: str
-    bodies: Sequence[Body]
+    bodies: Sequence[WritableBody]
     colour: str = ""
     body_names: Sequence[str] = ()
     face_names: Sequence[str] = ()

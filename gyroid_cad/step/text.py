@@ -24,8 +24,8 @@ Integers = NDArray[np.int64]
 _DECIMALS = 10
 # Of parts below a millimetre, more: they keep as many digits.
 _MOST_DECIMALS = 15
-# And of parts above a hundred kilometres fewer.
-_MOST_DIGITS = 17
+# Far from the origin fewer: digits before the point and behind it, one less than a number holds.
+_MOST_DIGITS = 15
 # Directions are rounding noise about 0 below this.
 _DIRECTION_DECIMALS = 15
 # Bytes of text that are made at once, about.
@@ -47,7 +47,7 @@ class StepText:
         self._last = 0
         self._once: dict[str, int] = {}
         before = math.floor(math.log10(extent or 1.0))
-        self._decimals = min(_DECIMALS + max(0, -before), _MOST_DECIMALS, _MOST_DIGITS - before)
+        self._decimals = min(_DECIMALS + max(0, -before), _MOST_DECIMALS, _MOST_DIGITS - 1 - before)
 
     def add(self, entity: str) -> int:
         """Write an entity; returns its number."""

@@ -28,7 +28,7 @@ from gyroid_cad.wall.offset import SIDES
 __all__ = ["WholeBuild", "whole_build"]
 
 # Peak memory a cell, as benchmarks/memory.py measures it, rounded up.
-_BYTES_PER_CELL = 700_000
+_BYTES_PER_CELL = 500_000
 # Volume by the flux through the faces against that between them: rounding only.
 _VOLUME_AGREEMENT = 1e-9
 _NOT_CUT = Islands()

@@ -19,15 +19,17 @@ Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Coordinates are written to so many places after the point, in mm: half a unit of the last is 5e-11 mm, less than a
-# thousandth of the kernel's smallest distance, wherever the part stands.
-_DECIMALS = 10
+# Coordinates are written to so many places after the point, in mm: half a unit of the last is 5e-10 mm, less than a
+# hundredth of the kernel's smallest distance, wherever the part stands.
+_DECIMALS = 9
 # Of parts below a millimetre, more: they keep as many digits.
 _MOST_DECIMALS = 15
 # Far from the origin fewer: digits before the point and behind it, one less than a number holds.
 _MOST_DIGITS = 15
 # Directions are rounding noise about 0 below this.
 _DIRECTION_DECIMALS = 15
+# Of the steps of knots, relative: rounding only.
+_EVEN = 1e-12
 # Bytes of text that are made at once, about.
 _BLOCK = 2_000_000
 
@@ -278,8 +280,15 @@ def _listed(numbers: Iterable[int]) -> str:
 @lru_cache(maxsize=256)
 def _knots(knots: tuple[Knots, ...]) -> str:
     multiplicities = [f"({_listed(counts)})" for _, counts in knots]
-    values = [_nested(list(some)) for some, _ in knots]
+    values = [_nested(_counted(list(some))) for some, _ in knots]
     return ",".join([*multiplicities, *values, ".UNSPECIFIED."])
+
+
+def _counted(values: list[float]) -> list[float]:
+    """Knots that are evenly spaced as 0, 1, 2 and so on: the same spline, in a tenth of the digits."""
+    steps = np.diff(values)
+    even = bool(np.ptp(steps) <= _EVEN * steps.mean())
+    return [float(number) for number in range(len(values))] if even else values
 
 
 def _nested(values: list[float] | list[list[float]]) -> str:

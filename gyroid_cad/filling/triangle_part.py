@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import signed_volumes
+from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import ROUTES, Kind, Route
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_meshing
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.part import shapes_of, solid_names
@@ -30,7 +31,16 @@ from gyroid_cad.mesh.triangles.files import read_triangles
 from gyroid_cad.mesh.triangles.measures import Hole, holes_of, open_edges
 from gyroid_cad.mesh.triangles.spread import spread_points
 
-__all__ = ["TrianglePart", "is_triangles", "mended", "naming_triangles", "require_route", "sound_body", "triangle_part"]
+__all__ = [
+    "TrianglePart",
+    "is_triangles",
+    "mended",
+    "naming_triangles",
+    "require_deviation",
+    "require_route",
+    "sound_body",
+    "triangle_part",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -256,6 +266,19 @@ def require_route(route: Route, **given: Any) -> None:
     for name, value in given.items():
         if route == ROUTES[0] and value not in (None, False):
             raise ParameterError(name, value, _AT_BREP[name])
+
+
+def require_deviation(deviation: float | None, cell_size: float) -> None:
+    """Check a deviation, if one is given: with one as large as a cell, little of part and lattice would be left.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if deviation is not None:
+        require_meshing(finite_number("deviation", deviation))
+        if deviation >= cell_size:
+            raise ParameterError("deviation", deviation, f"a length below the cell size, {cell_size:g} mm")
 
 
 def sound_body(vertices: Floats, triangles: Integers) -> tuple[Body | None, tuple[str, ...]]:

@@ -169,7 +169,8 @@ def _holds_nothing(solid: TopoDS_Shape) -> bool:
     volume = GProp_GProps()
     # At fixed points, which are the same on both sides of such faces: they cancel to rounding.
     BRepGProp.VolumeProperties_s(solid, volume)
-    return abs(volume.Mass()) <= _NOTHING * float(np.prod(np.ptp(corners_of(box_round([solid])), axis=0)))
+    box = float(np.prod(np.ptp(corners_of(box_round([solid])), axis=0)))
+    return bool(abs(volume.Mass()) <= _NOTHING * box)
 
 
 def _repaired(shape: TopoDS_Shape) -> list[TopoDS_Shape]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,14 +18,15 @@ from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
 
-from gyroid_cad.common.arrays import grouped
+from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.boundary import part_surface
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_wire
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.surface import NurbsSurface, point_derivatives
-from gyroid_cad.trim.surfaces import PartSurface
+from gyroid_cad.trim.free_surfaces import FreeForm, Swept
+from gyroid_cad.trim.surfaces import PartSurface, Quadric
 
 __all__ = ["FaceBorders", "FaceSurfaces", "Splines"]
 
@@ -33,6 +34,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _PLACES_AT_ONCE = 2**15
+# Of the squared sine between lines of parameters.
+_FLAT = 1e-12
 # Of a whole patch in parts of the parameters' ranges, and places that are one there.
 _CORNERS, _SAME = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]), 1e-6
 
@@ -48,8 +51,8 @@ class Splines:
 class FaceSurfaces:
     """Surfaces of faces.
 
-    ``others`` has those that are no plain B-splines, ``domains``, of shape (faces, 2, 2), the lowest and the highest
-    parameters of those that are, and nothing but NaN of the others.
+    ``groups`` has B-splines of one basis together, ``others`` those that are no plain B-splines, ``domains``, of shape
+    (faces, 2, 2), the lowest and the highest parameters of those that are, and nothing but NaN of the others.
     """
 
     def __init__(self, faces: Sequence[TopoDS_Face]) -> None:
@@ -73,7 +76,7 @@ class FaceSurfaces:
             key = (own.knots_u.tobytes(), own.knots_v.tobytes(), own.weights.tobytes())
             alike.setdefault(key, []).append((index, _placed(own, location)))
             self.domains[index] = [(own.knots_u[0], own.knots_v[0]), (own.knots_u[-1], own.knots_v[-1])]
-        self._groups = [
+        self.groups = [
             Splines(members[0][1], np.stack([own.control_points for _, own in members])) for members in alike.values()
         ]
         self._group, self._member = np.full((2, len(faces)), -1)
@@ -84,6 +87,42 @@ class FaceSurfaces:
     def evaluated(self, faces: Integers, places: Floats) -> tuple[Floats, Floats]:
         """As of :class:`gyroid_cad.mesh.triangles.outlined.Surfaces`."""
         points, normals = np.empty((2, len(faces), 3))
+        for rows, own in self._portions(faces):
+            if rows.ndim == 1:
+                surface = self.others[int(own[0])]
+                points[rows], normals[rows] = surface.points(places[rows]), surface.area_vectors(places[rows])
+            else:
+                found = self._spline_derivatives(own, places[rows], 1)
+                points[rows], normals[rows] = found[0], np.cross(found[1], found[2])
+        return points, normals
+
+    def smallest_radii(self, faces: Integers, places: Floats) -> Floats:
+        """Smaller radii of curvature (n,), in mm, on faces (n,) at places (n, 2); NaN where there is no normal.
+
+        By the principal curvatures, H + sqrt(H^2 - K) with their signs.
+        """
+        radii = np.empty(len(faces))
+        for rows, own in self._portions(faces):
+            surface = self.others.get(int(own[0])) if rows.ndim == 1 else None
+            if isinstance(surface, Quadric):
+                radii[rows] = surface.radii(places[rows])
+            elif surface is not None:
+                free = surface.free if isinstance(surface, Swept) else surface
+                assert isinstance(free, FreeForm)
+                radii[rows] = _radii(free.derivatives(places[rows], 2))
+            else:
+                radii[rows] = _radii(self._spline_derivatives(own, places[rows], 2))
+        return radii
+
+    def _spline_derivatives(self, faces: Integers, places: Floats, order: int) -> tuple[Floats, ...]:
+        """Points and derivatives of spline faces of one group (k,) at places (k, q, 2)."""
+        splines = self.groups[int(self._group[faces[0]])]
+        knots = splines.first.knots_u, splines.first.knots_v
+        nets = splines.nets[self._member[faces]]
+        return point_derivatives(nets, splines.first.weights, knots, places[..., 0], places[..., 1], order)
+
+    def _portions(self, faces: Integers) -> Iterator[tuple[Integers, Integers]]:
+        """Rows of some faces, and these: (n,) of one alone, (faces, n) of splines of one group, some rows twice."""
         order = np.argsort(faces, kind="stable")
         own, first, counts = np.unique(faces[order], return_index=True, return_counts=True)
         # Of each group, faces with like numbers of places together.
@@ -93,9 +132,7 @@ class FaceSurfaces:
         while start < len(own):
             group = int(self._group[own[start]])
             if group < 0:
-                rows = order[first[start] : first[start] + counts[start]]
-                surface = self.others[int(own[start])]
-                points[rows], normals[rows] = surface.points(places[rows]), surface.area_vectors(places[rows])
+                yield order[first[start] : first[start] + counts[start]], own[start : start + 1]
                 start += 1
                 continue
             end = start + 1
@@ -107,18 +144,23 @@ class FaceSurfaces:
                 end += 1
             most = int(counts[end - 1])
             index = np.minimum(np.arange(most), counts[start:end, np.newaxis] - 1) + first[start:end, np.newaxis]
-            rows = order[index]
-            splines = self._groups[group]
-            found = point_derivatives(
-                splines.nets[self._member[own[start:end]]],
-                splines.first.weights,
-                (splines.first.knots_u, splines.first.knots_v),
-                places[rows, 0],
-                places[rows, 1],
-            )
-            points[rows], normals[rows] = found[0], np.cross(found[1], found[2])
+            yield order[index], own[start:end]
             start = end
-        return points, normals
+
+
+def _radii(derivatives: tuple[Floats, ...]) -> Floats:
+    """Smaller radii of curvature by points and derivatives by u, v, uu, uv and vv, (..., 3)."""
+    _, du, dv, duu, duv, dvv = derivatives
+    normal = np.cross(du, dv)
+    square = dot(normal, normal)
+    e, f, g = dot(du, du), dot(du, dv), dot(dv, dv)
+    second_uu, second_uv, second_vv = (dot(bend, normal) for bend in (duu, duv, dvv))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = (e * second_vv - 2 * f * second_uv + g * second_uu) / (2 * square**1.5)
+        product = (second_uu * second_vv - second_uv**2) / square**2
+        largest = np.abs(mean) + np.sqrt(np.maximum(mean**2 - product, 0))
+        # Where derivatives all but vanish, as at a pole, curvature is rounding.
+        return np.where(square > _FLAT * e * g + np.finfo(float).tiny, 1 / largest, np.nan)
 
 
 class FaceBorders:
@@ -221,7 +263,7 @@ class FaceBorders:
         surfaces : FaceSurfaces
         """
         start, end = np.moveaxis(self.ends[use], 1, 0)
-        places = start + part[:, np.newaxis] * (end - start)
+        places: Floats = start + part[:, np.newaxis] * (end - start)
         bent = np.flatnonzero(np.isin(use, list(self.curves)))
         for number, some in grouped(use[bent]):
             curve, rows = self.curves[number], bent[some]

@@ -1,0 +1,152 @@
+"""Triangles of one mesh that cross each other, found through a tree of boxes, many pairs at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot
+
+__all__ = ["crossing_triangles"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Booleans = NDArray[np.bool_]
+
+# Triangles in a leaf of the tree, and pairs that are looked at together.
+_LEAF, _PAIRS_AT_ONCE = 4, 2**18
+# Bits of each coordinate by which triangles are put in order.
+_BITS = 20
+# So far inside a triangle, in parts of it, another must come through: what only touches does not cross.
+_INSIDE = 1e-6
+# Corners of a triangle from which its edges run, and to which.
+_FROM, _TO = np.array([0, 1, 2]), np.array([1, 2, 0])
+
+
+def crossing_triangles(
+    vertices: NDArray[np.floating], triangles: NDArray[np.integer], tolerance: float
+) -> tuple[Integers, Floats]:
+    """Pairs of triangles that cross, and a place of each.
+
+    Two cross where an edge of one, beside the corners they share, comes through the other from one side to the other.
+    Triangles with an edge in common, and those that lie in one plane, do not.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+    tolerance : float
+        How far past the plane of a triangle an edge must reach on both sides, in mm.
+
+    Returns
+    -------
+    pairs : ndarray of int, shape (n, 2)
+        The lower number first.
+    places : ndarray, shape (n, 3)
+        In mm.
+
+    Examples
+    --------
+    >>> corners = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.5, 0.5, 1], [3, 3, 1]], dtype=float)
+    >>> pairs, places = crossing_triangles(corners, np.array([[0, 1, 2], [3, 4, 5]]), 1e-9)
+    >>> pairs.tolist(), places.tolist()
+    ([[0, 1]], [[0.5, 0.5, 0.0]])
+    """
+    points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
+    pairs, places = [np.empty((0, 2), np.int64)], [np.empty((0, 3))]
+    for some in _near_pairs(points[facets]):
+        found, where = _crossing(points, facets, some, tolerance)
+        pairs.append(np.sort(found, axis=1))
+        places.append(where)
+    return np.concatenate(pairs), np.concatenate(places)
+
+
+def _near_pairs(corners: Floats) -> Iterator[Integers]:
+    """Pairs of triangles whose boxes overlap, each pair once, in portions; shape (n, 2)."""
+    if not len(corners):
+        return
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    order = _in_order((low + high) / 2)
+    depth = max(0, int(np.ceil(np.log2(max(1, len(order) / _LEAF)))))
+    # Triangles that fill the tree up have boxes that overlap nothing.
+    count = _LEAF << depth
+    lows, highs = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    lows[: len(order)], highs[: len(order)] = low[order], high[order]
+    levels = [(lows, highs)]
+    lows, highs = lows.reshape(-1, _LEAF, 3).min(axis=1), highs.reshape(-1, _LEAF, 3).max(axis=1)
+    levels.append((lows, highs))
+    for _ in range(depth):
+        lows, highs = lows.reshape(-1, 2, 3).min(axis=1), highs.reshape(-1, 2, 3).max(axis=1)
+        levels.append((lows, highs))
+    waiting = [(len(levels) - 1, np.zeros((1, 2), dtype=np.int64))]
+    while waiting:
+        level, pairs = waiting.pop()
+        if len(pairs) > _PAIRS_AT_ONCE:
+            waiting += [(level, half) for half in np.array_split(pairs, 2)]
+        elif level == 0:
+            yield order[pairs]
+        else:
+            waiting.append((level - 1, _among_children(pairs, 2 if level > 1 else _LEAF, *levels[level - 1])))
+
+
+def _in_order(places: Floats) -> Integers:
+    """Order of places along a curve that keeps near ones near (Morton)."""
+    low, extent = places.min(axis=0), np.ptp(places, axis=0).max()
+    cells = ((places - low) * ((2**_BITS - 1) / max(extent, np.finfo(float).tiny))).astype(np.uint64)
+    code = np.zeros(len(places), dtype=np.uint64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
+def _among_children(pairs: Integers, children: int, lows: Floats, highs: Floats) -> Integers:
+    """Pairs of children of boxes that overlap: of a box with itself, each pair of its children once."""
+    one, other = (index.ravel() for index in np.indices((children, children)))
+    first = (children * pairs[:, :1] + one).ravel()
+    second = (children * pairs[:, 1:] + other).ravel()
+    below = first <= second
+    first, second = first[below], second[below]
+    overlap = np.all((lows[first] <= highs[second]) & (lows[second] <= highs[first]), axis=1)
+    return np.stack([first[overlap], second[overlap]], axis=1)
+
+
+def _crossing(points: Floats, facets: Integers, pairs: Integers, tolerance: float) -> tuple[Integers, Floats]:
+    """Those of some pairs that cross, and where."""
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    shared = facets[pairs[:, 0]][:, :, np.newaxis] == facets[pairs[:, 1]][:, np.newaxis]
+    apart = shared.sum(axis=(1, 2)) < 2
+    pairs, shared = pairs[apart], shared[apart]
+    # Of each pair both triangles are cut by the edges of the other.
+    found, places = np.zeros(len(pairs), dtype=bool), np.empty((len(pairs), 3))
+    for cut, by, common in ((0, 1, shared.any(axis=1)), (1, 0, shared.any(axis=2))):
+        corners, others = points[facets[pairs[:, cut]]], points[facets[pairs[:, by]]]
+        origin = corners[:, :1]
+        along = corners[:, 1:] - origin
+        normals = np.cross(along[:, 0], along[:, 1])
+        length = np.linalg.norm(normals, axis=1)
+        safe = np.maximum(length, np.finfo(float).tiny)
+        heights = dot(others - origin, (normals / safe[:, np.newaxis])[:, np.newaxis])
+        # A corner in common lies in the plane, whatever rounding says.
+        heights[common] = 0.0
+        through = (heights[:, _FROM] * heights[:, _TO] < 0) & (
+            np.minimum(np.abs(heights[:, _FROM]), np.abs(heights[:, _TO])) > tolerance
+        )
+        row, edge = np.nonzero(through & (length > 0)[:, np.newaxis])
+        start, end = heights[row, _FROM[edge]], heights[row, _TO[edge]]
+        part = (start / (start - end))[:, np.newaxis]
+        place = (1 - part) * others[row, _FROM[edge]] + part * others[row, _TO[edge]]
+        inside = _inside(place - origin[row, 0], along[row], normals[row])
+        found[row[inside]], places[row[inside]] = True, place[inside]
+    return pairs[found], places[found]
+
+
+def _inside(offset: Floats, along: Floats, normal: Floats) -> Booleans:
+    """Tell which places in the planes of triangles, from their first corners, lie well inside them."""
+    square = dot(normal, normal)
+    second = dot(np.cross(offset, along[:, 1]), normal) / square
+    third = dot(np.cross(along[:, 0], offset), normal) / square
+    return np.asarray(np.minimum(np.minimum(second, third), 1 - second - third) > _INSIDE)

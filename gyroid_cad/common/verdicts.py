@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gyroid_cad.common.arrays import Point
 
-__all__ = ["Check", "Worst"]
+__all__ = ["Check", "Worst", "as_point", "counted", "largest", "smallest"]
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,3 +51,33 @@ class Check:
     limit: float | None
     ok: bool
     place: Point | None
+
+
+def as_point(place: Floats) -> Point:
+    """Coordinates of a place as plain numbers."""
+    x, y, z = place.tolist()
+    return x, y, z
+
+
+def smallest(values: Floats, places: Floats) -> Worst:
+    """Return the smallest of some values, shape (n,), and its place, of (n, 3); those that are NaN are left out."""
+    known = np.flatnonzero(~np.isnan(values))
+    if not len(known):
+        return Worst()
+    worst = known[np.argmin(values[known])]
+    return Worst(float(values[worst]), as_point(places[worst]))
+
+
+def largest(values: Floats, places: Floats) -> Worst:
+    """Return the largest of some values, as :func:`smallest` the smallest."""
+    found = smallest(-values, places)
+    return found if found.value is None else Worst(-float(found.value), found.place)
+
+
+def counted(places: Floats) -> Worst:
+    """Return how many places, shape (n, 3), there are, and the first of them.
+
+    >>> counted(np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]))
+    Worst(value=2, place=(1.0, 2.0, 3.0))
+    """
+    return Worst(len(places), as_point(places[0]) if len(places) else None)

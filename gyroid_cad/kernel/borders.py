@@ -84,6 +84,14 @@ class FaceSurfaces:
             for place, (index, _) in enumerate(members):
                 self._group[index], self._member[index] = number, place
 
+    def in_groups(self) -> Iterator[tuple[Splines, Integers]]:
+        """Splines of one basis after another, and the faces on them in their order."""
+        members = grouped(self._group[self._group >= 0])
+        spline_faces = np.flatnonzero(self._group >= 0)
+        for number, some in members:
+            own = spline_faces[some]
+            yield self.groups[number], own[np.argsort(self._member[own])]
+
     def evaluated(self, faces: Integers, places: Floats) -> tuple[Floats, Floats]:
         """As of :class:`gyroid_cad.mesh.triangles.outlined.Surfaces`."""
         points, normals = np.empty((2, len(faces), 3))

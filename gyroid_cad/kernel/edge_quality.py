@@ -12,9 +12,9 @@ from OCP.GeomAPI import GeomAPI_ProjectPointOnSurf
 from OCP.gp import gp_Pnt
 
 from gyroid_cad.common.arrays import dot, unit
-from gyroid_cad.common.verdicts import Worst
+from gyroid_cad.common.verdicts import Worst, as_point, largest, smallest
 from gyroid_cad.kernel.compat import RealArray, as_vertex
-from gyroid_cad.kernel.sampled import SampledShape, as_point, largest, smallest
+from gyroid_cad.kernel.sampled import SampledShape
 
 __all__ = ["edge_quality"]
 
@@ -51,7 +51,7 @@ def edge_quality(sampled: SampledShape) -> dict[str, Worst]:
         "gap of edges": _apart_at_vertices(sampled),
         "tangency": _tangency(sampled),
         "sharpest corner": _sharpest_corner(sampled),
-        "degree of curves": largest(np.where(degrees > 0, degrees, np.nan), middles),
+        "degree": largest(np.where(degrees > 0, degrees, np.nan), middles),
         "largest tolerance": _largest_tolerance(sampled),
     }
 

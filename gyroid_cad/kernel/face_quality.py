@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import by_number
-from gyroid_cad.common.verdicts import Worst
+from gyroid_cad.common.verdicts import Worst, as_point, largest, smallest
 from gyroid_cad.errors import ExportError, KernelError
 from gyroid_cad.kernel.borders import Splines
 from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.kernel.outlines import face_triangles
-from gyroid_cad.kernel.sampled import SampledShape, as_point, largest, smallest
+from gyroid_cad.kernel.sampled import SampledShape
 from gyroid_cad.kernel.stl import diagonal, meshed_by_face
-from gyroid_cad.mesh.triangles.crossings import crossing_triangles
+from gyroid_cad.mesh.triangles.faults import crossing_triangles
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.trim.loops import within_polygons
 
@@ -35,17 +35,19 @@ _GRID = 9
 _SPLINES_AT_ONCE = 64
 
 
-def face_quality(sampled: SampledShape) -> dict[str, Worst]:
+def face_quality(sampled: SampledShape, areas: Floats) -> dict[str, Worst]:
     """Measure the faces of a shape.
 
     Parameters
     ----------
     sampled : SampledShape
+    areas : ndarray, shape (faces,)
+        In mm2.
 
     Returns
     -------
     dict of str to Worst
-        "degree of surfaces"; "knot distance", in mm in space between lines of neighbouring knots; "narrowest face", its
+        "degree" of surfaces; "knot distance", in mm in space between lines of neighbouring knots; "narrowest face", its
         mean width in mm; "radius of curvature" in mm; "self-intersection", the number of pairs of faces that cross.
     """
     surfaces = sampled.surfaces
@@ -54,11 +56,11 @@ def face_quality(sampled: SampledShape) -> dict[str, Worst]:
     places = np.array([splines.nets[0, 0, 0] for splines in surfaces.groups]).reshape(-1, 3)
     vertices, triangles, owner = _triangles(sampled)
     return {
-        "degree of surfaces": largest(np.array(degrees, dtype=float), places),
+        "degree": largest(np.array(degrees, dtype=float), places),
         "knot distance": smallest(
             np.array([distance for distance, _ in knots]), np.array([place for _, place in knots]).reshape(-1, 3)
         ),
-        "narrowest face": _narrowest(sampled, vertices[triangles], owner),
+        "narrowest face": _narrowest(sampled, areas),
         "radius of curvature": _smallest_radius(sampled),
         "self-intersection": _crossings(sampled, vertices, triangles, owner, diagonal(sampled.shape)),
     }
@@ -95,17 +97,14 @@ def _triangles(sampled: SampledShape) -> tuple[Floats, Integers, Integers]:
         return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty(0, np.int64)
 
 
-def _narrowest(sampled: SampledShape, corners: Floats, owner: Integers) -> Worst:
+def _narrowest(sampled: SampledShape, areas: Floats) -> Worst:
     """Smallest mean width of a face, in mm: twice its area, over the length of its border."""
     borders, count = sampled.borders, len(sampled.faces)
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    area = np.bincount(owner, areas, count)
     length = np.bincount(borders.owner, np.nan_to_num(sampled.lengths[borders.edge]), count)
-    # Where no triangle was left of a face there is no width.
     places = np.array(
         [sampled.points[borders.edge[borders.loops[np.searchsorted(borders.face, k)]], 0] for k in range(count)]
     )
-    return smallest(np.where(length > 0, 2 * area / np.maximum(length, np.finfo(float).tiny), np.nan), places)
+    return smallest(np.where(length > 0, 2 * areas / np.maximum(length, np.finfo(float).tiny), np.nan), places)
 
 
 def _smallest_radius(sampled: SampledShape) -> Worst:

@@ -16,28 +16,27 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_SOLI
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
-from gyroid_cad.common.arrays import Point, unit
-from gyroid_cad.common.verdicts import Worst
+from gyroid_cad.common.arrays import unit
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.borders import FaceBorders, FaceSurfaces
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 
-__all__ = ["SampledShape", "as_point", "largest", "smallest"]
+__all__ = ["SampledShape"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 # Places along an edge, its ends among them: an odd number, for lengths are by Simpson's rule.
-_PLACES = 9
-_SIMPSON = np.array([1.0, 4, 2, 4, 2, 4, 2, 4, 1]) / (3 * (_PLACES - 1))
+_PLACES = 17
+_SIMPSON = np.array([1.0, *[4.0, 2.0] * (_PLACES // 2 - 1), 4.0, 1.0]) / (3 * (_PLACES - 1))
 # A surface has no normal where its area vector is so small a part of the largest one seen on the face.
 _NO_NORMAL = 1e-9
 
 
 class SampledShape:
-    """Faces of a shape, the edges round them, and places along each edge: nine, its ends among them.
+    """Faces of a shape, the edges round them, and places along each edge, its ends among them.
 
     Parameters
     ----------
@@ -129,27 +128,6 @@ class SampledShape:
         signs = np.where(turned, -1.0, 1.0)[face] * (sizes > _NO_NORMAL * largest[face])
         shape = (count, _PLACES, -1)
         return places.reshape(shape), found.reshape(shape), (unit(normals) * signs[:, np.newaxis]).reshape(shape)
-
-
-def as_point(place: Floats) -> Point:
-    """Coordinates of a place as plain numbers."""
-    x, y, z = place.tolist()
-    return x, y, z
-
-
-def smallest(values: Floats, places: Floats) -> Worst:
-    """Return the smallest of some values, shape (n,), and its place, of (n, 3); those that are NaN are left out."""
-    known = np.flatnonzero(~np.isnan(values))
-    if not len(known):
-        return Worst()
-    worst = known[np.argmin(values[known])]
-    return Worst(float(values[worst]), as_point(places[worst]))
-
-
-def largest(values: Floats, places: Floats) -> Worst:
-    """Return the largest of some values, as :func:`smallest` the smallest."""
-    found = smallest(-values, places)
-    return found if found.value is None else Worst(-float(found.value), found.place)
 
 
 def _closing(faces: Sequence[TopoDS_Face]) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:

@@ -14,6 +14,7 @@ from gyroid_cad.mesh.triangles.distances import locator_of, vtk_module
 __all__ = [
     "Hole",
     "TriangleMeasures",
+    "edge_uses",
     "holes_of",
     "measured_walls",
     "open_edges",
@@ -115,7 +116,7 @@ def unmatched_edges(triangles: NDArray[np.integer]) -> int:
     back, ahead = both[::2], both[1::2]
     if len(both) % 2 == 0 and np.all(back % 2 == 0) and np.all(ahead == back + 1) and np.all(np.diff(back) > 0):
         return 0
-    _, _, one_way, uses = _edge_uses(facets)
+    _, _, one_way, uses = edge_uses(facets)
     return int(np.sum((uses != 2) | (one_way != 1)))
 
 
@@ -126,8 +127,18 @@ def _edge_keys(facets: Integers) -> tuple[Integers, Booleans]:
     return low * (int(facets.max(initial=0)) + 1) + high, start < end
 
 
-def _edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
-    """Edges in an order that brings uses of one together, where each begins there, and how often it is used one way."""
+def edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
+    """Edges of triangles and their uses.
+
+    Returns
+    -------
+    order : ndarray of int, shape (3 triangles,)
+        Corners at which edges begin, three a triangle, so that the uses of one edge follow one another.
+    first : ndarray of int, shape (edges,)
+        Where the uses of each edge begin there.
+    one_way, uses : ndarray of int, shape (edges,)
+        How often each is used from its lower to its higher corner, and in all.
+    """
     keys, forward = _edge_keys(facets)
     order = np.argsort(keys, kind="stable")
     first = np.flatnonzero(np.diff(keys[order], prepend=-1))
@@ -159,7 +170,7 @@ def shell_labels(triangles: NDArray[np.integer]) -> Integers:
     array([0, 1, 0])
     """
     facets = np.asarray(triangles, dtype=np.int64)
-    order, first, *_ = _edge_uses(facets)
+    order, first, *_ = edge_uses(facets)
     return connected(len(facets), *_neighbours(order // 3, first))
 
 
@@ -224,7 +235,7 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     TriangleMeasures
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
-    order, first, one_way, uses = _edge_uses(facets)
+    order, first, one_way, uses = edge_uses(facets)
     owner = order // 3
     labels = connected(len(facets), *_neighbours(owner, first))
     opened = 2 * one_way != uses

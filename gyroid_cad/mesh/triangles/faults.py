@@ -1,4 +1,4 @@
-"""Triangles of one mesh that cross each other, found through a tree of boxes, many pairs at once."""
+"""Faults of triangles: edges that are open or shared by many, triangles without area, and such as cross each other."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.verdicts import Worst, as_point, counted
+from gyroid_cad.mesh.triangles.measures import edge_uses
 
-__all__ = ["crossing_triangles"]
+__all__ = ["crossing_triangles", "triangle_faults"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,8 +23,53 @@ _LEAF, _PAIRS_AT_ONCE = 4, 2**18
 _BITS = 20
 # So far inside a triangle, in parts of it, another must come through: what only touches does not cross.
 _INSIDE = 1e-6
+# An edge that comes through a triangle by less, in parts of the extent, touches it: so do corners that were rounded.
+_TOUCHES = 1e-6
 # Corners of a triangle from which its edges run, and to which.
 _FROM, _TO = np.array([0, 1, 2]), np.array([1, 2, 0])
+
+
+# Triangles so flat, in parts of the extent, have no normal in single precision.
+_FLAT = 1e-7
+
+
+def triangle_faults(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> dict[str, Worst]:
+    """Count the faults of triangles, each kind with the place of one.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+
+    Returns
+    -------
+    dict of str to Worst
+        "watertight": edges of one triangle; "manifold": edges of more than two; "orientation": edges that two triangles
+        run the same way; "self-intersection": pairs of triangles that cross; "degenerate triangles": flat ones.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> faults = triangle_faults(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
+    >>> {name: worst.value for name, worst in faults.items() if worst.value}
+    {'watertight': 3}
+    """
+    points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
+    order, first, one_way, uses = edge_uses(facets)
+    extent = float(np.ptp(points, axis=0).max())
+    corners = points[facets]
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1).max(axis=1)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    flat = areas <= _FLAT * extent * sides
+    kinds = {"watertight": uses == 1, "manifold": uses > 2, "orientation": (uses == 2) & (one_way != 1)}
+    begins = points[facets.ravel()[order[first]]]
+    pairs, places = crossing_triangles(points, facets, _TOUCHES * extent)
+    return {
+        **{name: counted(begins[mask]) for name, mask in kinds.items()},
+        "self-intersection": Worst(len(pairs), as_point(places[0]) if len(pairs) else None),
+        "degenerate triangles": counted(corners[flat, 0]),
+    }
 
 
 def crossing_triangles(

@@ -6,13 +6,15 @@ import os
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from gyroid_cad.common.choices import PROFILES, Profile
 from gyroid_cad.common.formats import PART_FORMATS, TRIANGLE_FORMATS, require_format
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.common.tables import text_table
 from gyroid_cad.common.verdicts import Check, Worst, counted
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.triangles.faults import triangle_faults
+from gyroid_cad.mesh.triangles.faults import flat_triangles, triangle_faults
 from gyroid_cad.mesh.triangles.files import read_triangle_file
 from gyroid_cad.mesh.triangles.measures import triangle_measures
 
@@ -253,10 +255,10 @@ def _check_triangles(path: str | os.PathLike[str], profile: Profile, progress: P
     read = read_triangle_file(path)
     report_progress(progress, "check", 0, 1)
     found, faults = triangle_measures(read.vertices, read.triangles), triangle_faults(read.vertices, read.triangles)
-    flat, dropped = faults["degenerate triangles"], counted(read.without_area)
+    flat = np.concatenate([read.without_area, flat_triangles(read.vertices, read.triangles)])
     worst = {
         **faults,
-        "degenerate triangles": Worst(int(flat.value) + int(dropped.value), flat.place or dropped.place),
+        "degenerate triangles": counted(flat),
         "inside out": Worst(found.inside_out),
         "pieces": Worst(found.pieces),
         "units": Worst(read.unit),

@@ -27,7 +27,7 @@ Integers = NDArray[np.int64]
 # Of the triangles by which faces are measured, in parts of the shape's diagonal; and between neighbours, in degrees.
 _DEVIATION, _FINEST, _ANGLE = 1e-3, 1e-6, 20.0
 # Where faces seem to cross they are looked at again, so many times, by triangles so many times as near.
-_ROUNDS, _NEARER = 2, 8.0
+_ROUNDS, _NEARER = 2, 4.0
 # An edge that comes through a triangle by less, in parts of the diagonal, touches it.
 _TOUCHES = 1e-7
 # Places along each parameter of a face where its curvature is looked at.

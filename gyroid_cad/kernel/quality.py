@@ -80,7 +80,7 @@ def shape_quality(shape: TopoDS_Shape, progress: Progress | None = None) -> Shap
     uses = np.bincount(sampled.borders.edge[sampled.uses], minlength=len(sampled.edges))
     middles = sampled.points[:, sampled.points.shape[1] // 2]
     faces = face_quality(sampled, areas)
-    degrees = [found["degree"] for found in (edges, faces) if found["degree"].value is not None]
+    degree = max(edges["degree"], faces["degree"], key=lambda found: float(found.value or 0))
     unmatched = Worst(counts.open_edges, counted(middles[sampled.real & (uses != 2)]).place)
     return ShapeQuality(
         solids=counts.solids,
@@ -94,7 +94,7 @@ def shape_quality(shape: TopoDS_Shape, progress: Progress | None = None) -> Shap
             "invalid faces": Worst(0) if valid else _invalid(sampled),
             **edges,
             **faces,
-            "degree": max(degrees, key=lambda found: found.value, default=Worst()),
+            "degree": degree,
         },
     )
 

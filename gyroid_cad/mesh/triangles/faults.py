@@ -11,7 +11,7 @@ from gyroid_cad.common.arrays import dot
 from gyroid_cad.common.verdicts import Worst, as_point, counted
 from gyroid_cad.mesh.triangles.measures import edge_uses
 
-__all__ = ["crossing_triangles", "triangle_faults"]
+__all__ = ["crossing_triangles", "flat_triangles", "triangle_faults"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,7 +21,7 @@ Booleans = NDArray[np.bool_]
 _LEAF, _PAIRS_AT_ONCE = 4, 2**18
 # Bits of each coordinate by which triangles are put in order.
 _BITS = 20
-# So far inside a triangle, in parts of it, another must come through: what only touches does not cross.
+# So far inside a triangle, in parts of it, an edge must come through: bodies that touch have edges through its border.
 _INSIDE = 1e-6
 # An edge that comes through a triangle by less, in parts of the extent, touches it: so do corners that were rounded.
 _TOUCHES = 1e-6
@@ -46,7 +46,7 @@ def triangle_faults(vertices: NDArray[np.floating], triangles: NDArray[np.intege
     -------
     dict of str to Worst
         "watertight": edges of one triangle; "manifold": edges of more than two; "orientation": edges that two triangles
-        run the same way; "self-intersection": pairs of triangles that cross; "degenerate triangles": flat ones.
+        run the same way; "self-intersection": pairs of triangles that cross.
 
     Examples
     --------
@@ -58,18 +58,29 @@ def triangle_faults(vertices: NDArray[np.floating], triangles: NDArray[np.intege
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
     order, first, one_way, uses = edge_uses(facets)
     extent = float(np.ptp(points, axis=0).max())
-    corners = points[facets]
-    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1).max(axis=1)
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    flat = areas <= _FLAT * extent * sides
     kinds = {"watertight": uses == 1, "manifold": uses > 2, "orientation": (uses == 2) & (one_way != 1)}
     begins = points[facets.ravel()[order[first]]]
     pairs, places = crossing_triangles(points, facets, _TOUCHES * extent)
     return {
         **{name: counted(begins[mask]) for name, mask in kinds.items()},
         "self-intersection": Worst(len(pairs), as_point(places[0]) if len(pairs) else None),
-        "degenerate triangles": counted(corners[flat, 0]),
     }
+
+
+def flat_triangles(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> Floats:
+    """First corners, shape (n, 3), of the triangles so flat that they have no normal in single precision.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    >>> flat_triangles(corners, np.array([[0, 1, 3], [1, 2, 0]])).tolist()
+    [[1.0, 0.0, 0.0]]
+    """
+    points = np.asarray(vertices, dtype=float)
+    corners = points[triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1).max(axis=1)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.asarray(corners[areas <= _FLAT * np.ptp(points, axis=0).max() * sides, 0])
 
 
 def crossing_triangles(
@@ -141,8 +152,8 @@ def _near_pairs(corners: Floats) -> Iterator[Integers]:
 
 def _in_order(places: Floats) -> Integers:
     """Order of places along a curve that keeps near ones near (Morton)."""
-    low, extent = places.min(axis=0), np.ptp(places, axis=0).max()
-    cells = ((places - low) * ((2**_BITS - 1) / max(extent, np.finfo(float).tiny))).astype(np.uint64)
+    low, extent = places.min(axis=0), float(np.ptp(places, axis=0).max())
+    cells = ((places - low) * ((2**_BITS - 1) / (extent or 1.0))).astype(np.uint64)
     code = np.zeros(len(places), dtype=np.uint64)
     for bit in range(_BITS):
         for axis in range(3):

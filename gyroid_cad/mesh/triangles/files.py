@@ -340,7 +340,7 @@ def _read_3mf(path: Path) -> TriangleFile:
         np.concatenate([np.zeros((0, 3)), *vertices]),
         np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles]),
         np.zeros((0, 3)),
-        str(unit.name).lower(),
+        str(unit.name).lower().replace("meter", "metre"),
     )
 
 

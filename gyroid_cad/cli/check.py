@@ -44,7 +44,7 @@ def check_command(context: click.Context, /, file: str, profile: Profile, as_jso
     \b
     gyroid-cad check part.step
     gyroid-cad check part.step --profile creo --json
-    gyroid-cad check print.stl
+    gyroid-cad check part.stl
     """
     start = time.perf_counter()
     require_libraries(kernel=False)

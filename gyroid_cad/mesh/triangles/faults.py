@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.graph import connected
 from gyroid_cad.common.verdicts import Worst, as_point, counted
 from gyroid_cad.mesh.triangles.measures import edge_uses
 
-__all__ = ["crossing_triangles", "flat_triangles", "triangle_faults"]
+__all__ = ["Hole", "crossing_triangles", "flat_triangles", "holes_of", "open_edges", "triangle_faults"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -31,6 +33,52 @@ _FROM, _TO = np.array([0, 1, 2]), np.array([1, 2, 0])
 
 # Triangles so flat, in parts of the extent, have no normal in single precision.
 _FLAT = 1e-7
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """Edges of triangles that no other triangle shares, connected to each other."""
+
+    edges: int
+    place: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        place = ", ".join(f"{round(coordinate, 3) + 0.0:g}" for coordinate in self.place)
+        return f"{self.edges} edges round ({place})"
+
+
+def holes_of(vertices: Floats, triangles: Integers) -> list[Hole]:
+    """Holes of triangles, the one with the most edges first.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    >>> [str(hole) for hole in holes_of(corners, sides)]
+    ['3 edges round (0.333, 0.333, 0.333)']
+    """
+    edges, label = open_edges(triangles, len(vertices))
+    found = []
+    for number in range(int(label.max(initial=-1)) + 1):
+        own = edges[label == number]
+        x, y, z = vertices[np.unique(own)].mean(axis=0).tolist()
+        found.append(Hole(len(own), (x, y, z)))
+    return sorted(found, key=lambda hole: -hole.edges)
+
+
+def open_edges(triangles: Integers, count: int) -> tuple[Integers, Integers]:
+    """Edges that are used more often one way than the other, as they are used, and the hole of each."""
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    keys, back = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
+    order = np.argsort(keys, kind="stable")
+    own, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
+    others = back[order][first]
+    where = np.searchsorted(own, others).clip(max=max(len(own) - 1, 0))
+    reverse = np.where(own[where] == others, uses[where], 0)
+    found = np.repeat(edges[order][first], np.maximum(uses - reverse, 0), axis=0)
+    corners, numbers = np.unique(found, return_inverse=True)
+    ends = numbers.reshape(-1, 2)
+    return found, connected(len(corners), ends[:, 0], ends[:, 1])[ends[:, 0]] if len(found) else np.empty(0, np.int64)
 
 
 def triangle_faults(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> dict[str, Worst]:
@@ -108,10 +156,10 @@ def crossing_triangles(
 
     Examples
     --------
-    >>> corners = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.5, 0.5, 1], [3, 3, 1]], dtype=float)
+    >>> corners = np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [1, 1, 1], [9, 9, 1]])
     >>> pairs, places = crossing_triangles(corners, np.array([[0, 1, 2], [3, 4, 5]]), 1e-9)
     >>> pairs.tolist(), places.tolist()
-    ([[0, 1]], [[0.5, 0.5, 0.0]])
+    ([[0, 1]], [[2.0, 2.0, 0.0]])
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
     pairs, places = [np.empty((0, 2), np.int64)], [np.empty((0, 3))]
@@ -173,7 +221,7 @@ def _among_children(pairs: Integers, children: int, lows: Floats, highs: Floats)
 
 
 def _crossing(points: Floats, facets: Integers, pairs: Integers, tolerance: float) -> tuple[Integers, Floats]:
-    """Those of some pairs that cross, and where."""
+    """Return those of some pairs that cross, and where."""
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     shared = facets[pairs[:, 0]][:, :, np.newaxis] == facets[pairs[:, 1]][:, np.newaxis]
     apart = shared.sum(axis=(1, 2)) < 2

@@ -12,12 +12,9 @@ from gyroid_cad.common.graph import connected
 from gyroid_cad.mesh.triangles.distances import locator_of, vtk_module
 
 __all__ = [
-    "Hole",
     "TriangleMeasures",
     "edge_uses",
-    "holes_of",
     "measured_walls",
-    "open_edges",
     "shell_labels",
     "surface_places",
     "triangle_measures",
@@ -172,52 +169,6 @@ def shell_labels(triangles: NDArray[np.integer]) -> Integers:
     facets = np.asarray(triangles, dtype=np.int64)
     order, first, *_ = edge_uses(facets)
     return connected(len(facets), *_neighbours(order // 3, first))
-
-
-@dataclass(frozen=True, slots=True)
-class Hole:
-    """Edges of triangles that no other triangle shares, connected to each other."""
-
-    edges: int
-    place: tuple[float, float, float]
-
-    def __str__(self) -> str:
-        place = ", ".join(f"{round(coordinate, 3) + 0.0:g}" for coordinate in self.place)
-        return f"{self.edges} edges round ({place})"
-
-
-def holes_of(vertices: Floats, triangles: Integers) -> list[Hole]:
-    """Holes of triangles, the one with the most edges first.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    >>> [str(hole) for hole in holes_of(corners, sides)]
-    ['3 edges round (0.333, 0.333, 0.333)']
-    """
-    edges, label = open_edges(triangles, len(vertices))
-    found = []
-    for number in range(int(label.max(initial=-1)) + 1):
-        own = edges[label == number]
-        x, y, z = vertices[np.unique(own)].mean(axis=0).tolist()
-        found.append(Hole(len(own), (x, y, z)))
-    return sorted(found, key=lambda hole: -hole.edges)
-
-
-def open_edges(triangles: Integers, count: int) -> tuple[Integers, Integers]:
-    """Edges that are used more often one way than the other, as they are used, and the hole of each."""
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    keys, back = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
-    order = np.argsort(keys, kind="stable")
-    own, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
-    others = back[order][first]
-    where = np.searchsorted(own, others).clip(max=max(len(own) - 1, 0))
-    reverse = np.where(own[where] == others, uses[where], 0)
-    found = np.repeat(edges[order][first], np.maximum(uses - reverse, 0), axis=0)
-    corners, numbers = np.unique(found, return_inverse=True)
-    ends = numbers.reshape(-1, 2)
-    return found, connected(len(corners), ends[:, 0], ends[:, 1])[ends[:, 0]] if len(found) else np.empty(0, np.int64)
 
 
 def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> TriangleMeasures:

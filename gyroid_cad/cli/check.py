@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 __all__ = ["check_command", "checked_files", "print_file_checks", "require_unbroken"]
 
 
-def checked_files(paths: Sequence[str], progress: Progress | None) -> list[FileCheck]:
-    """Check files that were just written, by the usual limits."""
+def checked_files(paths: Sequence[str], progress: Progress | None, profile: Profile = "default") -> list[FileCheck]:
+    """Check files by the limits of a profile, one after the other."""
     from gyroid_cad.builds.file_check import check_file
 
-    return [check_file(path, progress=named_progress(progress, path)) for path in paths]
+    return [check_file(path, profile, named_progress(progress, path)) for path in paths]
 
 
 def print_file_checks(checks: Sequence[FileCheck]) -> None:
@@ -70,10 +70,8 @@ def check_command(file: str, profile: Profile, as_json: bool, quiet: bool) -> No
     """
     start = time.perf_counter()
     require_libraries(kernel=False)
-    from gyroid_cad.builds.file_check import check_file
-
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
-        check = check_file(file, profile, progress)
+        (check,) = checked_files([file], progress, profile)
     if as_json:
         click.echo(json.dumps(check.as_dict()))
     elif not quiet:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.common.verdicts import Worst, counted
+from gyroid_cad.kernel.apart import read_shape
 from gyroid_cad.kernel.borders import FaceBorders
 from gyroid_cad.kernel.check import is_valid, measure_about, topology
 from gyroid_cad.kernel.edge_quality import edge_quality
@@ -23,7 +25,7 @@ from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.nurbs.surface import face_integrals
 from gyroid_cad.trim.surfaces import Quadric
 
-__all__ = ["ShapeQuality", "shape_quality"]
+__all__ = ["ShapeQuality", "file_quality", "shape_quality"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -59,6 +61,18 @@ class ShapeQuality:
     valid: bool
     volume: float
     worst: dict[str, Worst]
+
+
+def file_quality(path: str | os.PathLike[str], progress: Progress | None = None) -> ShapeQuality:
+    """Measure the shape of a STEP or BREP file, as :func:`shape_quality` does.
+
+    Raises
+    ------
+    ExportError
+        If it cannot be read or holds no shape.
+    """
+    report_progress(progress, "read", 0, 1)
+    return shape_quality(read_shape(path), progress)
 
 
 def shape_quality(shape: TopoDS_Shape, progress: Progress | None = None) -> ShapeQuality:

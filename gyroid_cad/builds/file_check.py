@@ -237,12 +237,9 @@ def check_file(
 
 def _check_shape(path: str | os.PathLike[str], profile: Profile, progress: Progress | None) -> FileCheck:
     # The kernel is loaded only for files that hold shapes.
-    from gyroid_cad.kernel.quality import shape_quality
-    from gyroid_cad.kernel.reading import read_shape
+    from gyroid_cad.kernel.quality import file_quality
 
-    report_progress(progress, "read", 0, 1)
-    shape = read_shape(path)
-    found = shape_quality(shape, progress)
+    found = file_quality(path, progress)
     worst = {**found.worst, "solids": Worst(found.solids), "inside out": Worst(int(found.closed and found.volume < 0))}
     checks = tuple(criterion.check(worst[criterion.name], profile) for criterion in CRITERIA)
     ok = all(check.ok for check in checks) and found.closed and found.valid

@@ -27,6 +27,8 @@ _MEANT_SMOOTH = 5.0
 _ANYWAY = 1e-4
 # At so many places the nearest one is looked for, which takes a millisecond each.
 _LOOKED_AT = 500
+# Of a curve's range of parameters.
+_SAME_KNOT = 1e-9
 
 
 def edge_quality(sampled: SampledShape) -> dict[str, Worst]:
@@ -57,7 +59,10 @@ def edge_quality(sampled: SampledShape) -> dict[str, Worst]:
 
 
 def _shortest_segment(curve: Any) -> tuple[float, tuple[float, float, float]]:
-    """Length of the shortest piece between neighbouring knots within an edge, and where it is; NaN of no spline."""
+    """Length of the shortest piece between neighbouring knots of an edge's curve, and where it is; NaN of no spline.
+
+    Pieces of which the edge takes up a part only, where it ends between two knots, are left out.
+    """
     none = np.nan, (np.nan,) * 3
     if curve is None or curve.GetType() != GeomAbs_BSplineCurve:
         return none
@@ -69,8 +74,12 @@ def _shortest_segment(curve: Any) -> tuple[float, tuple[float, float, float]]:
     t = np.interp(np.arange(2 * count + 1) / 2, np.arange(count + 1), values)
     points = np.array([curve.Value(one).Coord() for one in t.tolist()])
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1).reshape(-1, 2).sum(axis=1)
+    spline = curve.BSpline()
+    own = np.array([spline.Knot(k) for k in range(1, spline.NbKnots() + 1)])
+    cut = np.abs(own[:, np.newaxis] - values[[0, -1]]).min(axis=0) > _SAME_KNOT * np.ptp(own)
+    lengths[[0, -1]] = np.where(cut, np.inf, lengths[[0, -1]])
     shortest = int(np.argmin(lengths))
-    return float(lengths[shortest]), as_point(points[2 * shortest + 1])
+    return (float(lengths[shortest]), as_point(points[2 * shortest + 1])) if np.isfinite(lengths[shortest]) else none
 
 
 def _degree(curve: Any) -> int:

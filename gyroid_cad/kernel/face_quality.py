@@ -90,10 +90,15 @@ def _knot_distance(splines: Splines) -> tuple[float, Floats]:
 
 def _triangles(sampled: SampledShape) -> tuple[Floats, Integers, Integers]:
     """Triangles of the faces of a shape, and the face of each; none where they cannot be made."""
-    shape = compound_of(sampled.faces) if sampled.open_borders else sampled.shape
+    deviation = max(_DEVIATION * diagonal(sampled.shape), _FINEST)
     try:
-        return meshed_by_face(shape, "the check", max(_DEVIATION * diagonal(shape), _FINEST), _ANGLE)
-    except (ExportError, KernelError):
+        made = face_triangles(sampled.faces, deviation, radians(_ANGLE), (sampled.surfaces, sampled.borders))
+        return made.vertices, made.triangles, made.faces
+    except KernelError:
+        pass
+    try:
+        return meshed_by_face(compound_of(sampled.faces), "the check", deviation, _ANGLE)
+    except ExportError:
         return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty(0, np.int64)
 
 

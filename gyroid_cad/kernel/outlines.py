@@ -37,7 +37,12 @@ _AT_POLE = 32
 _FINER = 4
 
 
-def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float) -> FaceTriangles:
+def face_triangles(
+    faces: Sequence[TopoDS_Face],
+    deviation: float,
+    angle: float,
+    known: tuple[FaceSurfaces, FaceBorders] | None = None,
+) -> FaceTriangles:
     """Triangles of faces, with the places along an edge shared by all that it bounds; turned as the faces are.
 
     Parameters
@@ -47,6 +52,8 @@ def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float)
         Largest distance of a triangle from its face, in mm.
     angle : float
         Largest angle between neighbouring triangles within a face, and chords along an edge, in radians.
+    known : tuple of FaceSurfaces and FaceBorders, optional
+        Of these faces, if they were read before.
 
     Raises
     ------
@@ -54,7 +61,7 @@ def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float)
         If a face has no border, or one that does not close in the plane of its parameters.
     """
     limit = deviation / _MARGIN
-    surfaces, borders = FaceSurfaces(faces), FaceBorders(faces)
+    surfaces, borders = known or (FaceSurfaces(faces), FaceBorders(faces))
     edges = _Edges(borders.edges, borders.vertices, limit, angle)
     for _ in range(_FINER):
         made = triangulated_faces(_outlines(borders, edges, surfaces), surfaces, edges.points, limit, angle)

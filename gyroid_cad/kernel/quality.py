@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.common.verdicts import Worst, counted
+from gyroid_cad.kernel.apart import read_shape
 from gyroid_cad.kernel.borders import FaceBorders
 from gyroid_cad.kernel.check import is_valid, measure_about, topology
 from gyroid_cad.kernel.edge_quality import edge_quality
@@ -21,14 +23,15 @@ from gyroid_cad.kernel.sampled import SampledShape
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import SquareQuadrature
 from gyroid_cad.nurbs.surface import face_integrals
+from gyroid_cad.trim.surfaces import Quadric
 
-__all__ = ["ShapeQuality", "shape_quality"]
+__all__ = ["ShapeQuality", "file_quality", "shape_quality"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Along a use of an edge: pieces, and Gauss points of each.
-_PIECES, _PER_PIECE = 16, 3
+_PIECES, _PER_PIECE = 32, 3
 # Trimmed faces that are sampled together.
 _AT_ONCE = 32
 
@@ -58,6 +61,18 @@ class ShapeQuality:
     valid: bool
     volume: float
     worst: dict[str, Worst]
+
+
+def file_quality(path: str | os.PathLike[str], progress: Progress | None = None) -> ShapeQuality:
+    """Measure the shape of a STEP or BREP file, as :func:`shape_quality` does.
+
+    Raises
+    ------
+    ExportError
+        If it cannot be read or holds no shape.
+    """
+    report_progress(progress, "read", 0, 1)
+    return shape_quality(read_shape(path), progress)
 
 
 def shape_quality(shape: TopoDS_Shape, progress: Progress | None = None) -> ShapeQuality:
@@ -132,6 +147,11 @@ def _measures(sampled: SampledShape) -> tuple[Floats, Floats]:
                 ):
                     sums[face] = _trimmed(borders, face, quadrature, density)
             known[members[trimmed]] = True
+    for number in np.flatnonzero(~known).tolist():
+        plane = surfaces.others.get(number)
+        if isinstance(plane, Quadric) and plane.kind == "plane":
+            sums[number] = _flat(sampled, number, plane, middle)
+            known[number] = True
     sums[:, 0] *= signs
     for number in np.flatnonzero(~known).tolist():
         sums[number] = measure_about(sampled.faces[number], middle)
@@ -148,6 +168,20 @@ def _trimmed(borders: FaceBorders, face: int, quadrature: SquareQuadrature, dens
         places.append(place)
         rates.append(rate[:, 1] * weights * (1.0 if borders.along[use] else -1.0))
     return quadrature.over(np.concatenate(places), np.concatenate(rates), density)[[0, 4]]
+
+
+def _flat(sampled: SampledShape, face: int, plane: Quadric, middle: Floats) -> Floats:
+    """Flux and area of a plane face, by its area vector, the integral of r x dr / 2 round its border."""
+    borders, total = sampled.borders, np.zeros(3)
+    parts, weights = gauss_points(np.linspace(0, 1, _PIECES + 1), _PER_PIECE)
+    first, end = borders.loops[np.searchsorted(borders.face, [face, face + 1])].tolist()
+    for use in range(first, end):
+        if sampled.real[borders.edge[use]]:
+            points, rates = sampled.along(int(borders.edge[use]), parts)
+            total += weights @ np.cross(points - middle, rates) / (2.0 if borders.along[use] else -2.0)
+    # As the plane's own normal goes, with which the face's border runs.
+    area = float(total @ plane.axes[2]) * plane.handed
+    return np.array([area * plane.handed * float((plane.origin - middle) @ plane.axes[2]) / 3, abs(area)])
 
 
 def _along(borders: FaceBorders, use: int, parts: Floats) -> tuple[Floats, Floats]:

@@ -64,8 +64,13 @@ class SampledShape:
     def __init__(self, shape: TopoDS_Shape) -> None:
         self.shape = shape
         every = [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
-        self.faces, self.open_borders = _closing(every)
-        self.surfaces, self.borders = FaceSurfaces(self.faces), FaceBorders(self.faces)
+        self.faces, self.open_borders = every, list[TopoDS_Face]()
+        try:
+            self.borders = FaceBorders(every)
+        except KernelError:
+            self.faces, self.open_borders = _closing(every)
+            self.borders = FaceBorders(self.faces)
+        self.surfaces = FaceSurfaces(self.faces)
         numbered = self.borders.edges
         self.edges = [as_edge(numbered.FindKey(k).Oriented(TopAbs_FORWARD)) for k in range(1, numbered.Extent() + 1)]
         self.curves = [None if BRep_Tool.Degenerated_s(edge) else BRepAdaptor_Curve(edge) for edge in self.edges]
@@ -74,6 +79,10 @@ class SampledShape:
         for number, curve in enumerate(self.curves):
             if curve is not None:
                 self.points[number], self.rates[number] = _along(curve, self.parts)
+
+    def along(self, edge: int, parts: Floats) -> tuple[Floats, Floats]:
+        """Points, shape (n, 3), of an edge that is not shrunk to a point, and derivatives by the part of its range."""
+        return _along(self.curves[edge], parts)
 
     @cached_property
     def bodies(self) -> Integers:

@@ -10,6 +10,7 @@ import trimesh
 
 from gyroid_cad import check_file
 from gyroid_cad.cli.app import main
+from gyroid_cad.kernel import apart
 
 Captured = pytest.CaptureFixture[str]
 
@@ -54,6 +55,21 @@ def test_the_table_tells_what_is_broken_and_where(capsys: Captured, torn: Path) 
 def test_quiet_says_nothing_and_the_status_tells(capsys: Captured, ball: Path, torn: Path) -> None:
     assert run(capsys, ball, "--quiet") == (0, "", "")
     assert run(capsys, torn, "--quiet") == (1, "", "")
+
+
+def test_build_checks_each_file_that_it_wrote_and_its_status_tells(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(apart, "read_apart", lambda path, reader: reader(str(path)))
+    files = [str(tmp_path / name) for name in ("cell.brep", "cell.stl")]
+    cell = ["--cells", "1", "1", "1", "--cell-size", "10", "--thickness", "0.8", "--check", "--json"]
+    for fit, expected in (("10", 0), ("4", 1)):
+        status = main(["build", *cell, "--control-points", fit, "-o", files[0], "-o", files[1]])
+        checks = json.loads(capsys.readouterr().out)["checks"]
+        assert status == expected
+        assert [check["file"] for check in checks] == files
+        # Patches of so few control points meet at a third of a degree; triangles are closed all the same.
+        assert [check["ok"] for check in checks] == [not expected, True]
 
 
 def test_bad_input_is_one_line(capsys: Captured, tmp_path: Path, ball: Path) -> None:

@@ -33,8 +33,8 @@ from gyroid_cad.kernel.check import compound_of, measure, parts_of
 from gyroid_cad.kernel.compat import PointArray, as_edge, as_vertex
 from gyroid_cad.kernel.quality import shape_quality
 from gyroid_cad.kernel.step import read_step
-from gyroid_cad.kernel.surfaces import kernel_surface
-from gyroid_cad.nurbs.surface import NurbsSurface
+from gyroid_cad.kernel.surfaces import kernel_curve, kernel_surface
+from gyroid_cad.nurbs.surface import NurbsCurve, NurbsSurface
 
 PARTS = Path(__file__).parents[3] / "shared" / "parts"
 BOX = BRepPrimAPI_MakeBox(4.0, 5.0, 6.0).Shape()
@@ -151,6 +151,20 @@ def test_knots_are_as_far_apart_as_their_lines_are_in_space() -> None:
     value, place = worst(plank(0.5, 0.501), "knot distance")
     assert value == pytest.approx(0.01)
     assert place == pytest.approx((5.005, 1, 0))
+
+
+def test_a_segment_counts_where_the_edge_takes_it_up_from_knot_to_knot() -> None:
+    knots = np.array([0, 0, 0.3, 0.301, 0.9, 1, 1])
+    curve = kernel_curve(NurbsCurve(10 * np.outer(np.unique(knots), [1, 0, 0]), np.ones(5), knots))
+
+    def strip(first: float, last: float) -> TopoDS_Shape:
+        return BRepPrimAPI_MakePrism(BRepBuilderAPI_MakeEdge(curve, first, last).Edge(), gp_Vec(0, 0, 3)).Shape()
+
+    assert worst(strip(0, 1), "smallest segment")[0] == pytest.approx(0.01)
+    assert worst(strip(0.299, 1), "smallest segment")[0] == pytest.approx(0.01)
+    # From 0.3005 on, and up to 0.3005, no more than a part of it is there.
+    assert worst(strip(0.3005, 1), "smallest segment")[0] == pytest.approx(1)
+    assert worst(strip(0, 0.3005), "smallest segment")[0] == pytest.approx(3)
 
 
 def test_a_face_that_was_sewn_over_a_gap_is_as_far_off_its_edges_as_it_was() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import dot
+from gyroid_cad.common.arrays import dot, unit
 from gyroid_cad.common.graph import connected
 from gyroid_cad.common.verdicts import Worst, as_point, counted
 from gyroid_cad.mesh.triangles.measures import edge_uses
@@ -226,32 +226,39 @@ def _crossing(points: Floats, facets: Integers, pairs: Integers, tolerance: floa
     shared = facets[pairs[:, 0]][:, :, np.newaxis] == facets[pairs[:, 1]][:, np.newaxis]
     apart = shared.sum(axis=(1, 2)) < 2
     pairs, shared = pairs[apart], shared[apart]
-    # Of each pair both triangles are cut by the edges of the other.
+    # Most pairs are neighbours, of which one lies on one side of the other.
+    for cut in (0, 1):
+        heights = _heights(points, facets, pairs, cut, shared.any(axis=1 + cut))
+        through = (heights.min(axis=1) < -tolerance) & (heights.max(axis=1) > tolerance)
+        pairs, shared = pairs[through], shared[through]
     found, places = np.zeros(len(pairs), dtype=bool), np.empty((len(pairs), 3))
-    for cut, by, common in ((0, 1, shared.any(axis=1)), (1, 0, shared.any(axis=2))):
-        corners, others = points[facets[pairs[:, cut]]], points[facets[pairs[:, by]]]
-        origin = corners[:, :1]
-        along = corners[:, 1:] - origin
-        normals = np.cross(along[:, 0], along[:, 1])
-        length = np.linalg.norm(normals, axis=1)
-        safe = np.maximum(length, np.finfo(float).tiny)
-        heights = dot(others - origin, (normals / safe[:, np.newaxis])[:, np.newaxis])
-        # A corner in common lies in the plane, whatever rounding says.
-        heights[common] = 0.0
-        through = (heights[:, _FROM] * heights[:, _TO] < 0) & (
-            np.minimum(np.abs(heights[:, _FROM]), np.abs(heights[:, _TO])) > tolerance
-        )
-        row, edge = np.nonzero(through & (length > 0)[:, np.newaxis])
-        start, end = heights[row, _FROM[edge]], heights[row, _TO[edge]]
-        part = (start / (start - end))[:, np.newaxis]
-        place = (1 - part) * others[row, _FROM[edge]] + part * others[row, _TO[edge]]
-        inside = _inside(place - origin[row, 0], along[row], normals[row])
+    for cut in (0, 1):
+        heights = _heights(points, facets, pairs, cut, shared.any(axis=1 + cut))
+        start, end = heights[:, _FROM], heights[:, _TO]
+        row, edge = np.nonzero((start * end < 0) & (np.minimum(np.abs(start), np.abs(end)) > tolerance))
+        corners, others = points[facets[pairs[row, cut]]], points[facets[pairs[row, 1 - cut]]]
+        part = (start / np.where(start == end, 1.0, start - end))[row, edge, np.newaxis]
+        index = np.arange(len(row))
+        place = (1 - part) * others[index, _FROM[edge]] + part * others[index, _TO[edge]]
+        inside = _inside(place - corners[:, 0], corners[:, 1:] - corners[:, :1])
         found[row[inside]], places[row[inside]] = True, place[inside]
     return pairs[found], places[found]
 
 
-def _inside(offset: Floats, along: Floats, normal: Floats) -> Booleans:
+def _heights(points: Floats, facets: Integers, pairs: Integers, cut: int, common: Booleans) -> Floats:
+    """Heights of the corners of one triangle of each pair over the plane of the other, ``cut``; shape (n, 3).
+
+    A corner in common lies in the plane, whatever rounding says.
+    """
+    first, second, third = (points[facets[pairs[:, cut], k]] for k in range(3))
+    normals = unit(np.cross(second - first, third - first))
+    heights = dot(points[facets[pairs[:, 1 - cut]]] - first[:, np.newaxis], normals[:, np.newaxis])
+    return np.where(common, 0.0, heights)
+
+
+def _inside(offset: Floats, along: Floats) -> Booleans:
     """Tell which places in the planes of triangles, from their first corners, lie well inside them."""
+    normal = np.cross(along[:, 0], along[:, 1])
     square = dot(normal, normal)
     second = dot(np.cross(offset, along[:, 1]), normal) / square
     third = dot(np.cross(along[:, 0], offset), normal) / square

@@ -13,12 +13,14 @@ from typing import Literal, get_args
 __all__ = [
     "FITS",
     "KINDS",
+    "PROFILES",
     "ROUTES",
     "SCHEMAS",
     "SURFACE_NAMES",
     "TRIMS",
     "FitName",
     "Kind",
+    "Profile",
     "Route",
     "Schema",
     "SurfaceName",
@@ -32,6 +34,8 @@ Trim = Literal["box"]
 Route = Literal["brep", "triangles"]
 # Of STEP files.
 Schema = Literal["ap214", "ap242"]
+# By whose limits a file is checked.
+Profile = Literal["default", "creo", "nx"]
 # On the command line, where no FitSettings can be given.
 FitName = Literal["smooth", "paper"]
 
@@ -40,4 +44,5 @@ SURFACE_NAMES: tuple[SurfaceName, ...] = get_args(SurfaceName)
 TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)
 ROUTES: tuple[Route, ...] = get_args(Route)
+PROFILES: tuple[Profile, ...] = get_args(Profile)
 FITS: tuple[FitName, ...] = get_args(FitName)

@@ -27,8 +27,8 @@ from gyroid_cad.kernel.repair import chosen_solids, require_volume
 from gyroid_cad.kernel.stl import solid_triangles
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.distances import SignedDistances
+from gyroid_cad.mesh.triangles.faults import Hole, holes_of, open_edges
 from gyroid_cad.mesh.triangles.files import read_triangles
-from gyroid_cad.mesh.triangles.measures import Hole, holes_of, open_edges
 from gyroid_cad.mesh.triangles.spread import spread_points
 
 __all__ = [

@@ -14,7 +14,7 @@ from gyroid_cad import ParameterError
 from gyroid_cad.filling.triangle_part import mended, sound_body, triangle_part
 from gyroid_cad.kernel.stl import solid_triangles
 from gyroid_cad.mesh.triangles.booleans import united
-from gyroid_cad.mesh.triangles.measures import holes_of
+from gyroid_cad.mesh.triangles.faults import holes_of
 
 
 def cube(low: float = 0.0, high: float = 2.0) -> tuple[Any, Any]:

@@ -18,6 +18,7 @@ from gyroid_cad.former import METHODS, FormerModules, Moved, former_name
 from gyroid_cad.version import __version__
 
 if TYPE_CHECKING:
+    from gyroid_cad.builds.file_check import FileCheck, check_file
     from gyroid_cad.builds.meshes import mesh_quality
     from gyroid_cad.errors import (
         ExportError,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ExportError",
     "Field",
+    "FileCheck",
     "FillReport",
     "Filled",
     "FilledTriangles",
@@ -62,12 +64,14 @@ __all__ = [
     "SelfIntersectionError",
     "VolumePatches",
     "__version__",
+    "check_file",
     "fill",
     "mesh_quality",
     "print_check",
 ]
 
 _HOMES = {
+    "builds.file_check": ("FileCheck", "check_file"),
     "builds.meshes": ("mesh_quality",),
     "errors": (
         "ExportError",

@@ -164,6 +164,9 @@ WRITTEN = {
     "schema": Case({"file": "made.step", "schema": "ap242"}, lambda made, usual: b"AP242" in made.file.read_bytes()),
     "deviation": Case({"file": "made.stl", "deviation": 0.2}, sized),
     "angle": Case({"file": "made.stl", "deviation": 0.5, "angle": 80}, sized),
+    "check": Case(
+        {"file": "made.brep", "check": True}, lambda made, usual: told(made, "largest tolerance", "closed, valid")
+    ),
     "printer": Case({"file": "made.brep", "printer": "form2"}, lambda made, usual: told(made, "Form 2")),
     "progress": Case({"cell size": 9, "progress": True}, lambda made, usual: len(set(made.stages)) > 1),
     "json": Case({"file": "made.brep", "json": True}, lambda made, usual: json.loads(made.said)["files"] != []),

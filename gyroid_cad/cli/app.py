@@ -77,6 +77,7 @@ _MODULES = {
     "mesh": "mesh",
     "volumes": "mesh",
     "view": "view",
+    "check": "check",
     "print-check": "print_check",
     "report": "report",
     "doctor": "doctor",

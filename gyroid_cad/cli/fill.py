@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from gyroid_cad.cli.check import checked_files, print_file_checks, require_unbroken
 from gyroid_cad.cli.console import print_check_table, print_report, shown_progress
 from gyroid_cad.cli.lattice_options import (
     PAPER_OPTIONS,
@@ -25,6 +26,7 @@ from gyroid_cad.cli.lattice_options import (
 )
 from gyroid_cad.cli.options import (
     angle_option,
+    check_option,
     deviation_option,
     file_paths,
     json_option,
@@ -51,6 +53,7 @@ from gyroid_cad.errors import KernelError, ParameterError
 __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
+SURFACE = KINDS[-1]
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
     *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
@@ -137,6 +140,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @schema_option
 @deviation_option
 @angle_option
+@check_option
 @printer_option("Check as well whether it can make this, such as form2.")
 @click.option("--print-config", is_flag=True, help="Print all of this as TOML, ready for FILL.toml; fill nothing.")
 @json_option
@@ -186,6 +190,8 @@ def fill_command(
     if settings["route"] == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         settings["deviation"], written = given["deviation"], {}
+    elif given["kind"] == SURFACE:
+        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
     elif given["fillet"] is not None:
         accepted = "none at --route brep, whose solids have sharp corners there; --route triangles rounds them"
         raise ParameterError("fillet", given["fillet"], accepted)
@@ -196,17 +202,22 @@ def fill_command(
             raise KernelError(str(failed).replace('route="triangles"', "--route triangles")) from failed
         filled.write(*output, **written, progress=progress)
         check = None if checked is None else checked(filled, given["deviation"], progress)
+        of_files = checked_files(output if given["check"] else (), progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = file_sizes(output)
     if check is not None:
         summary["print_check"] = check.as_dict()
+    if given["check"]:
+        summary["checks"] = [one.as_dict() for one in of_files]
     if as_json:
         click.echo(json.dumps(summary))
     elif not quiet:
         print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
         if check is not None:
             print_check_table(check)
+        print_file_checks(of_files)
+    require_unbroken(of_files)
 
 
 def _route(part: str, chosen: Route | None, output: Sequence[str]) -> Route:

@@ -13,6 +13,7 @@ from gyroid_cad.version import __version__
 
 __all__ = [
     "angle_option",
+    "check_option",
     "deviation_option",
     "file_paths",
     "json_option",
@@ -87,6 +88,11 @@ angle_option = click.option(
     show_default=True,
     metavar="DEGREES",
     help="Between triangles of a solid that is cut; those of whole patches keep to the deviation alone.",
+)
+check_option = click.option(
+    "--check",
+    is_flag=True,
+    help="Check each file that was written, as the command check does; the status is 1 if a limit is broken.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the table.")
 quiet_option = click.option("--quiet", is_flag=True, help="Print no table and no progress.")

@@ -13,6 +13,7 @@ from typing import Literal, get_args
 __all__ = [
     "FITS",
     "KINDS",
+    "PROFILES",
     "ROUTES",
     "SCHEMAS",
     "SURFACE_NAMES",
@@ -20,6 +21,7 @@ __all__ = [
     "CheckedBy",
     "FitName",
     "Kind",
+    "Profile",
     "Route",
     "Schema",
     "SurfaceName",
@@ -35,6 +37,8 @@ Route = Literal["brep", "triangles"]
 Schema = Literal["ap214", "ap242"]
 # Of what is announced as valid: by the numbers of edges and the control nets, or by the kernel.
 CheckedBy = Literal["nets", "kernel"]
+# By whose limits a file is checked.
+Profile = Literal["default", "creo", "nx"]
 # On the command line, where no FitSettings can be given.
 FitName = Literal["smooth", "paper"]
 
@@ -43,4 +47,5 @@ SURFACE_NAMES: tuple[SurfaceName, ...] = get_args(SurfaceName)
 TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)
 ROUTES: tuple[Route, ...] = get_args(Route)
+PROFILES: tuple[Profile, ...] = get_args(Profile)
 FITS: tuple[FitName, ...] = get_args(FitName)

@@ -83,6 +83,7 @@ _NO_TRIANGLES = _but_hosts("a host's shape needs a B-rep, which triangles are no
 _OF_PAPER = _but_hosts("`Lattice.paper(...)`, then `to_cadquery` or `to_build123d`")
 _OF_BLOCK = _but_python("in `lattice`, a `Lattice`")
 _CHECK = {"python": Absent("`print_check(made, printer)`")}
+_OF_FILE = {"python": Absent("`check_file(path)`, of any file")}
 _ELSEWHERE = {"python": Absent("nothing is there to combine with"), "shell": Absent("nothing is there to combine with")}
 
 _WALL = (
@@ -103,6 +104,7 @@ _WRITTEN = (
     _row("angle", **_WRITING),
 )
 _ANSWER = (
+    _row("check", **_OF_FILE),
     _row("printer", **_CHECK),
     _row("progress", Absent("shown on a terminal, unless `--quiet`"), **_NO_PROGRESS),
     _shell_alone("json", "`report.as_dict()`"),

@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
-from OCP.BRepTools import BRepTools_WireExplorer
-from OCP.Geom import Geom_BSplineSurface
-from OCP.GeomAbs import GeomAbs_C1, GeomAbs_Line, GeomAbs_Plane
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX, TopAbs_WIRE
+from OCP.BRepAdaptor import BRepAdaptor_Curve
+from OCP.GeomAbs import GeomAbs_C1, GeomAbs_Line
+from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopExp import TopExp
-from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face
 
 from gyroid_cad.common.arrays import dot, numbered_groups, unit
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.boundary import part_surface
-from gyroid_cad.kernel.check import parts_of
-from gyroid_cad.kernel.compat import NumberedShapes, RealArray, as_edge, as_face, as_vertex, as_wire
-from gyroid_cad.kernel.surfaces import nurbs_of_surface
+from gyroid_cad.kernel.borders import FaceBorders, FaceSurfaces
+from gyroid_cad.kernel.compat import NumberedShapes, RealArray, as_edge, as_vertex
 from gyroid_cad.mesh.triangles.outlined import Outlines
 from gyroid_cad.mesh.triangles.trimmed import FaceTriangles, triangulated_faces
-from gyroid_cad.nurbs.surface import NurbsSurface, point_derivatives
-from gyroid_cad.trim.surfaces import PartSurface
 
 __all__ = ["face_triangles"]
 
@@ -43,12 +35,14 @@ _MOST_CHORDS = 4096
 _AT_POLE = 32
 # Borders that cross in the plane of the parameters are looked at again with twice the chords, so many times.
 _FINER = 4
-_PLACES_AT_ONCE = 2**15
-# Of a whole patch in parts of the parameters' ranges, and places that are one there.
-_CORNERS, _SAME = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]), 1e-6
 
 
-def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float) -> FaceTriangles:
+def face_triangles(
+    faces: Sequence[TopoDS_Face],
+    deviation: float,
+    angle: float,
+    known: tuple[FaceSurfaces, FaceBorders] | None = None,
+) -> FaceTriangles:
     """Triangles of faces, with the places along an edge shared by all that it bounds; turned as the faces are.
 
     Parameters
@@ -58,6 +52,8 @@ def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float)
         Largest distance of a triangle from its face, in mm.
     angle : float
         Largest angle between neighbouring triangles within a face, and chords along an edge, in radians.
+    known : tuple of FaceSurfaces and FaceBorders, optional
+        Of these faces, if they were read before.
 
     Raises
     ------
@@ -65,10 +61,10 @@ def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float)
         If a face has no border, or one that does not close in the plane of its parameters.
     """
     limit = deviation / _MARGIN
-    surfaces, borders = _Surfaces(faces), _Borders(faces)
+    surfaces, borders = known or (FaceSurfaces(faces), FaceBorders(faces))
     edges = _Edges(borders.edges, borders.vertices, limit, angle)
     for _ in range(_FINER):
-        made = triangulated_faces(borders.outlines(edges, surfaces), surfaces, edges.points, limit, angle)
+        made = triangulated_faces(_outlines(borders, edges, surfaces), surfaces, edges.points, limit, angle)
         if not made.crossed.any():
             break
         edges.halve(borders.edges_of(made.crossed))
@@ -77,201 +73,20 @@ def face_triangles(faces: Sequence[TopoDS_Face], deviation: float, angle: float)
     return FaceTriangles(made.vertices, triangles, made.faces, made.crossed)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Splines:
-    """B-spline surfaces that differ by their control points alone."""
-
-    first: NurbsSurface
-    nets: Floats
-
-
-class _Surfaces:
-    """Surfaces of faces.
-
-    ``others`` has those that are no plain B-splines, ``domains``, of shape (faces, 2, 2), the lowest and the highest
-    parameters of those that are, and nothing but NaN of the others.
-    """
-
-    def __init__(self, faces: Sequence[TopoDS_Face]) -> None:
-        self.others: dict[int, PartSurface] = {}
-        self.domains = np.full((len(faces), 2, 2), np.nan)
-        surfaces: dict[int, tuple[Geom_BSplineSurface, NurbsSurface]] = {}
-        alike: dict[tuple[bytes, ...], list[tuple[int, NurbsSurface]]] = {}
-        for index, face in enumerate(faces):
-            location = TopLoc_Location()
-            surface = BRep_Tool.Surface_s(face, location)
-            if not isinstance(surface, Geom_BSplineSurface) or surface.IsUPeriodic() or surface.IsVPeriodic():
-                adaptor = BRepAdaptor_Surface(face, True)
-                low = np.array([adaptor.FirstUParameter(), adaptor.FirstVParameter()])
-                high = np.array([adaptor.LastUParameter(), adaptor.LastVParameter()])
-                self.others[index] = part_surface(adaptor, (low, high))
-                continue
-            if id(surface) not in surfaces:
-                # Kept alive, so that its id stays its own.
-                surfaces[id(surface)] = surface, nurbs_of_surface(surface)
-            own = surfaces[id(surface)][1]
-            key = (own.knots_u.tobytes(), own.knots_v.tobytes(), own.weights.tobytes())
-            alike.setdefault(key, []).append((index, _placed(own, location)))
-            self.domains[index] = [(own.knots_u[0], own.knots_v[0]), (own.knots_u[-1], own.knots_v[-1])]
-        self._groups = [
-            _Splines(members[0][1], np.stack([own.control_points for _, own in members])) for members in alike.values()
-        ]
-        self._group, self._member = np.full((2, len(faces)), -1)
-        for number, members in enumerate(alike.values()):
-            for place, (index, _) in enumerate(members):
-                self._group[index], self._member[index] = number, place
-
-    def evaluated(self, faces: Integers, places: Floats) -> tuple[Floats, Floats]:
-        """As of :class:`gyroid_cad.mesh.triangles.outlined.Surfaces`."""
-        points, normals = np.empty((2, len(faces), 3))
-        order = np.argsort(faces, kind="stable")
-        own, first, counts = np.unique(faces[order], return_index=True, return_counts=True)
-        # Of each group, faces with like numbers of places together.
-        ranked = np.lexsort([counts, self._group[own]])
-        own, first, counts = own[ranked], first[ranked], counts[ranked]
-        start = 0
-        while start < len(own):
-            group = int(self._group[own[start]])
-            if group < 0:
-                rows = order[first[start] : first[start] + counts[start]]
-                surface = self.others[int(own[start])]
-                points[rows], normals[rows] = surface.points(places[rows]), surface.area_vectors(places[rows])
-                start += 1
-                continue
-            end = start + 1
-            while (
-                end < len(own)
-                and self._group[own[end]] == group
-                and counts[end] * (end + 1 - start) <= max(_PLACES_AT_ONCE, counts[start])
-            ):
-                end += 1
-            most = int(counts[end - 1])
-            index = np.minimum(np.arange(most), counts[start:end, np.newaxis] - 1) + first[start:end, np.newaxis]
-            rows = order[index]
-            splines = self._groups[group]
-            found = point_derivatives(
-                splines.nets[self._member[own[start:end]]],
-                splines.first.weights,
-                (splines.first.knots_u, splines.first.knots_v),
-                places[rows, 0],
-                places[rows, 1],
-            )
-            points[rows], normals[rows] = found[0], np.cross(found[1], found[2])
-            start = end
-        return points, normals
-
-
-class _Borders:
-    """Edges round faces, in order, and the curves in the planes of the faces' parameters."""
-
-    def __init__(self, faces: Sequence[TopoDS_Face]) -> None:
-        self.edges, self.vertices = NumberedShapes(), NumberedShapes()
-        for face in faces:
-            TopExp.MapShapes_s(face, TopAbs_EDGE, self.edges)
-            TopExp.MapShapes_s(face, TopAbs_VERTEX, self.vertices)
-        forward = [as_face(face.Oriented(TopAbs_FORWARD)) for face in faces]
-        loops = [(index, loop) for index, face in enumerate(forward) for loop in self._wires(face)]
-        self._face = np.array([index for index, _ in loops], dtype=np.int64)
-        self._loops = np.cumsum([0, *(len(loop) for _, loop in loops)])
-        uses = [(index, number, edge) for index, loop in loops for number, edge in loop]
-        self._edge = np.array([number for _, number, _ in uses], dtype=np.int64)
-        self._along = np.array([edge.Orientation() == TopAbs_FORWARD for _, _, edge in uses], dtype=bool)
-        # Ends of the straight ones; of the others the curve.
-        self._ends = np.full((len(uses), 2, 2), np.nan)
-        self._curves: dict[int, BRepAdaptor_Curve2d] = {}
-        flat = np.array([BRepAdaptor_Surface(face, False).GetType() == GeomAbs_Plane for face in faces], dtype=bool)
-        self._flat = flat[np.repeat(self._face, np.diff(self._loops))]
-        for use in np.flatnonzero(~self._flat).tolist():
-            index, _, edge = uses[use]
-            curve = BRepAdaptor_Curve2d(edge, forward[index])
-            if curve.GetType() == GeomAbs_Line:
-                ends = curve.FirstParameter(), curve.LastParameter()
-                self._ends[use] = [curve.Value(t).Coord() for t in ends]
-            else:
-                self._curves[use] = curve
-
-    def edges_of(self, faces: NDArray[np.bool_]) -> Integers:
-        """Numbers of the edges round some faces."""
-        return np.unique(self._edge[np.repeat(faces[self._face], np.diff(self._loops))])
-
-    def _wires(self, face: TopoDS_Face) -> list[list[tuple[int, TopoDS_Edge]]]:
-        loops = []
-        for wire in parts_of(face, TopAbs_WIRE):
-            loop = [(int(self.edges.FindIndex(edge)) - 1, as_edge(edge)) for edge in parts_of(wire, TopAbs_EDGE)]
-            ends = [(TopExp.FirstVertex_s(edge, True), TopExp.LastVertex_s(edge, True)) for _, edge in loop]
-            numbers = [tuple(self.vertices.FindIndex(vertex) for vertex in pair) for pair in ends]
-            distinct = len({start for start, _ in numbers}) == len(numbers)
-            if not distinct or any(numbers[k - 1][1] != numbers[k][0] for k in range(len(numbers))):
-                loop = self._in_order(wire, face, len(loop))
-            loops.append(loop)
-        if not loops:
-            raise KernelError("a face without a border has no triangles")
-        return loops
-
-    def _in_order(self, wire: TopoDS_Shape, face: TopoDS_Face, count: int) -> list[tuple[int, TopoDS_Edge]]:
-        explorer, loop = BRepTools_WireExplorer(as_wire(wire), face), []
-        while explorer.More():
-            edge = explorer.Current()
-            loop.append((int(self.edges.FindIndex(edge)) - 1, edge))
-            explorer.Next()
-        if len(loop) != count:
-            raise KernelError("a border of a face does not close")
-        return loop
-
-    def outlines(self, edges: _Edges, surfaces: _Surfaces) -> Outlines:
-        """Borders of all faces, with the places that the edges have now."""
-        order, squares = self._squares(edges, surfaces.domains)
-        steps = edges.steps[self._edge[order]]
-        use, index = numbered_groups(steps)
-        ahead = self._along[order][use]
-        at = edges.first[self._edge[order]][use] + np.where(ahead, index, steps[use] - index)
-        vertices, part = edges.numbers[at], edges.parts[at, np.newaxis]
-        loops = np.concatenate([[0], np.cumsum(steps)])[self._loops]
-        start, end = np.moveaxis(self._ends[order][use], 1, 0)
-        places = start + part * (end - start)
-        corner = np.repeat(self._face, np.diff(loops))
-        first = np.cumsum(steps) - steps
-        for place in np.flatnonzero(np.isin(order, list(self._curves))).tolist():
-            own = np.arange(first[place], first[place] + steps[place])
-            curve = self._curves[int(order[place])]
-            low, high = curve.FirstParameter(), curve.LastParameter()
-            along = low + edges.parts[at[own]] * (high - low)
-            places[own] = [curve.Value(t).Coord() for t in along.tolist()]
-        flat = np.flatnonzero(self._flat[order][use])
-        for own in np.split(flat, np.flatnonzero(np.diff(corner[flat])) + 1) if len(flat) else []:
-            places[own] = surfaces.others[int(corner[own[0]])].distances(edges.points[vertices[own]])[2]
-        return Outlines(places, vertices, loops, self._face, squares)
-
-    def _squares(self, edges: _Edges, domains: Floats) -> tuple[Integers, Integers]:
-        """Order of the uses of edges, those of whole patches from the lowest parameters on, and the steps of these."""
-        order, squares = np.arange(len(self._edge)), np.zeros((len(domains), 4), dtype=np.int64)
-        of_four = np.diff(self._loops) == 4
-        alone = np.bincount(self._face, minlength=len(domains))[self._face] == 1
-        some = np.flatnonzero(of_four & alone)
-        uses = self._loops[some, np.newaxis] + np.arange(4)
-        numbers = self._edge[uses]
-        distinct = np.all(np.diff(np.sort(numbers, axis=1), axis=1) > 0, axis=1)
-        good = distinct & edges.even[numbers].all(axis=1)
-        some, uses = some[good], uses[good]
-        low, high = np.moveaxis(domains[self._face[some]], 1, 0)
-        starts = np.where(self._along[uses][..., np.newaxis], self._ends[uses, 0], self._ends[uses, 1])
-        places = (starts - low[:, np.newaxis]) / (high - low)[:, np.newaxis]
-        for turn in range(4):
-            turned = np.roll(places, -turn, axis=1)
-            # Of what has no domain, or is not straight, nothing is near.
-            whole = np.all(np.abs(turned - _CORNERS) < _SAME, axis=(1, 2))
-            own = np.roll(uses[whole], -turn, axis=1)
-            order[uses[whole]] = own
-            squares[self._face[some[whole]]] = edges.steps[self._edge[own]]
-        return order, squares
-
-
-def _placed(surface: NurbsSurface, location: TopLoc_Location) -> NurbsSurface:
-    if location.IsIdentity():
-        return surface
-    transformation = location.Transformation()
-    rows = np.array([[transformation.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
-    return surface.transformed(rows[:, :3], rows[:, 3])
+def _outlines(borders: FaceBorders, edges: _Edges, surfaces: FaceSurfaces) -> Outlines:
+    """Borders of all faces, with the places that the edges have now."""
+    order, squares = np.arange(len(borders.edge)), np.zeros((len(surfaces.domains), 4), dtype=np.int64)
+    whole = borders.whole_patches(surfaces.domains)
+    whole = whole[edges.even[borders.edge[whole]].all(axis=1)]
+    order[np.sort(whole, axis=1)] = whole
+    squares[borders.owner[whole[:, 0]]] = edges.steps[borders.edge[whole]]
+    steps = edges.steps[borders.edge[order]]
+    use, index = numbered_groups(steps)
+    at = edges.first[borders.edge[order]][use] + np.where(borders.along[order][use], index, steps[use] - index)
+    vertices = edges.numbers[at]
+    loops = np.concatenate([[0], np.cumsum(steps)])[borders.loops]
+    places = borders.places(order[use], edges.parts[at], edges.points[vertices], surfaces)
+    return Outlines(places, vertices, loops, borders.face, squares)
 
 
 class _Edges:

@@ -73,9 +73,13 @@ def kernel_surface(surface: NurbsSurface) -> Geom_BSplineSurface:
 
 def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
     """Arrays of a B-spline surface that the kernel holds."""
-    n, m = surface.NbUPoles(), surface.NbVPoles()
-    poles = [[surface.Pole(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
-    weights = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
+    rows, columns = range(1, surface.NbUPoles() + 1), range(1, surface.NbVPoles() + 1)
+    # As one array: to ask for every pole by itself takes twice as long.
+    poles = surface.Poles()
+    points = np.array([[poles.Value(i, j).Coord() for j in columns] for i in rows])
+    weights = np.ones(points.shape[:2])
+    if surface.IsURational() or surface.IsVRational():
+        weights = np.array([[surface.Weight(i, j) for j in columns] for i in rows])
     knots_u = np.repeat(
         [surface.UKnot(i) for i in range(1, surface.NbUKnots() + 1)],
         [surface.UMultiplicity(i) for i in range(1, surface.NbUKnots() + 1)],
@@ -84,8 +88,7 @@ def nurbs_of_surface(surface: Geom_BSplineSurface) -> NurbsSurface:
         [surface.VKnot(i) for i in range(1, surface.NbVKnots() + 1)],
         [surface.VMultiplicity(i) for i in range(1, surface.NbVKnots() + 1)],
     )
-    points = np.array([[(p.X(), p.Y(), p.Z()) for p in row] for row in poles])
-    return NurbsSurface(points, np.array(weights), knots_u, knots_v)
+    return NurbsSurface(points, weights, knots_u, knots_v)
 
 
 def kernel_knots(vector: Floats) -> tuple[RealArray, IntegerArray]:

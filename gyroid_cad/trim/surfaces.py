@@ -143,6 +143,24 @@ class Quadric:
             own = minor * self._profile(t)[0][:, np.newaxis] * outwards
         return np.asarray(self.handed * own @ self.axes)
 
+    def radii(self, places: Floats) -> Floats:
+        """Smaller radii of curvature (n,) at parameters (n, 2), in mm; infinite in a plane.
+
+        >>> torus = Quadric("torus", np.zeros(3), np.eye(3), 5.0, 1.0)
+        >>> torus.radii(np.array([[0.0, 0.0], [2.0, np.pi]])).round(9).tolist()
+        [1.0, 1.0]
+        """
+        if self.kind == "plane":
+            return np.full(len(places), np.inf)
+        along = np.abs(self._profile(places[:, 1])[0])
+        if self.kind == "cone":
+            return np.asarray(along / np.cos(self.second))
+        if self.kind != "torus":
+            return np.full(len(places), self.radius)
+        # Of a parallel, as it bends along the normal.
+        steep = np.maximum(np.abs(np.cos(places[:, 1])), np.finfo(float).tiny)
+        return np.minimum(self.second, along / steep)
+
     def crosses_at(self, place: Floats) -> bool:
         """Tell whether the profile has crossed the axis at parameters, shape (2,)."""
         return self.kind != "plane" and float(self._profile(place[1:])[0][0]) < 0

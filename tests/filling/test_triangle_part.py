@@ -14,7 +14,7 @@ from gyroid_cad import ParameterError
 from gyroid_cad.filling.triangle_part import mended, sound_body, triangle_part
 from gyroid_cad.kernel.stl import solid_triangles
 from gyroid_cad.mesh.triangles.booleans import united
-from gyroid_cad.mesh.triangles.measures import holes_of
+from gyroid_cad.mesh.triangles.faults import holes_of
 
 
 def cube(low: float = 0.0, high: float = 2.0) -> tuple[Any, Any]:
@@ -71,6 +71,22 @@ def test_corners_that_nearly_meet_are_welded() -> None:
     assert body is not None
     assert body.volume == pytest.approx(8.0, rel=1e-5)
     assert "corners welded" in remarks[0]
+
+
+def test_triangles_that_are_all_apart_are_no_part_once_each_is_closed_by_its_back(tmp_path: Path) -> None:
+    vertices, triangles = cube()
+    corners = vertices[triangles]
+    apart = 0.9 * corners + 0.1 * corners.mean(axis=1, keepdims=True)
+    trimesh.Trimesh(apart.reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)).export(tmp_path / "soup.stl")
+    with pytest.raises(ParameterError, match=f"expected closed triangles: there are {len(triangles)} holes"):
+        triangle_part(tmp_path / "soup.stl", (), 0.1, repair=True)
+
+
+def test_triangles_that_lie_on_others_are_left_out_and_counted() -> None:
+    vertices, triangles = cube()
+    body, remarks = mended(vertices, np.concatenate([triangles, triangles[:5]]))
+    assert body is not None
+    assert (round(body.volume, 9), remarks) == (8.0, ("5 triangles on others left out",))
 
 
 def test_cubes_that_touch_in_an_edge_are_a_body_and_those_that_overlap_are_united() -> None:

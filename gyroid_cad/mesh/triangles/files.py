@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,7 +19,16 @@ from gyroid_cad.common.formats import OBJ, STL, THREE_MF, TRIANGLE_FORMATS, Form
 from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["STL_RECORD", "binary_stl_corners", "keep_facets", "numbered_corners", "read_triangles", "renumbered"]
+__all__ = [
+    "STL_RECORD",
+    "TriangleFile",
+    "binary_stl_corners",
+    "keep_facets",
+    "numbered_corners",
+    "read_triangle_file",
+    "read_triangles",
+    "renumbered",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,6 +40,27 @@ STL_HEADER_BYTES = 84
 # Of 3MF, in bytes: 1 GB of it holds about fifteen million triangles, and text of numbers packs ten times or so.
 _MOST_UNPACKED, _MOST_PER_BYTE, _LEAST_ALLOWED = 1_000_000_000, 100, 10_000_000
 _EXPECTED = "a file of triangles, binary or text STL, 3MF, OBJ or PLY"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TriangleFile:
+    """Contents of a file of triangles.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+    without_area : ndarray, shape (left out, 3)
+        A corner of each triangle that was left out, for two of its corners are one.
+    unit : str
+        That the file says its numbers are in; "none" where it cannot say.
+    """
+
+    vertices: Floats
+    triangles: Integers
+    without_area: Floats
+    unit: str
 
 
 def read_triangles(path: str | os.PathLike[str], form: Format | None = None) -> tuple[Floats, Integers]:
@@ -56,19 +87,36 @@ def read_triangles(path: str | os.PathLike[str], form: Format | None = None) -> 
     ParameterError
         If the file cannot be read, or holds no triangles.
     """
+    read = read_triangle_file(path, form)
+    return read.vertices, read.triangles
+
+
+def read_triangle_file(path: str | os.PathLike[str], form: Format | None = None) -> TriangleFile:
+    """Read all that an STL, 3MF, OBJ or PLY file says, as :func:`read_triangles` the triangles.
+
+    Raises
+    ------
+    ParameterError
+        If the file cannot be read, or holds no triangles.
+    """
     target = Path(path)
     form = form or require_format("file", path, TRIANGLE_FORMATS, f"{_EXPECTED}: a name ending in ")
     if reason := unreadable(path):
         raise ParameterError("file", str(path), f"{_EXPECTED} that can be read: {reason}")
     if form is THREE_MF:
-        vertices, triangles = _read_3mf(target)
+        read = _read_3mf(target)
     elif form is STL:
-        vertices, triangles, _ = numbered_corners(_stl_corners(target))
+        read = _numbered(_stl_corners(target))
     else:
-        vertices, triangles = _read_obj(target) if form is OBJ else _read_ply(target)
-    if not len(triangles) or not np.isfinite(vertices).all():
+        read = _read_obj(target) if form is OBJ else _read_ply(target)
+    if not len(read.triangles) or not np.isfinite(read.vertices).all():
         raise ParameterError("file", str(path), f"{_EXPECTED}, with triangles of finite size in it")
-    return vertices, triangles
+    return read
+
+
+def _numbered(corners: Floats) -> TriangleFile:
+    vertices, triangles, kept = numbered_corners(corners)
+    return TriangleFile(vertices, triangles, corners[~kept, 0], "none")
 
 
 def _stl_corners(path: Path) -> Floats:
@@ -155,29 +203,33 @@ def _distinct(flat: NDArray[Real]) -> tuple[Integers, Integers]:
     return first, numbers.ravel().astype(np.int64)
 
 
-def _read_obj(path: Path) -> tuple[Floats, Integers]:
+def _read_obj(path: Path) -> TriangleFile:
     """Triangles of OBJ, larger polygons fanned out; corners counted from 1, or backwards from the last one, below 0."""
-    corners: list[list[str]] = []
+    corners: list[list[float]] = []
     faces: list[list[int]] = []
+    number = 0
     try:
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("v "):
-                corners.append(line.split()[1:4])
-            elif line.startswith("f "):
-                numbers = [int(word.partition("/")[0]) for word in line.split()[1:]]
-                numbers = [number - 1 if number > 0 else len(corners) + number for number in numbers]
-                faces += [[numbers[0], *pair] for pair in pairwise(numbers[1:])]
-        points, found = np.array(corners, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
-    except ValueError as problem:
-        raise ParameterError("file", str(path), f"{_EXPECTED}: {problem}") from None
+            number += 1
+            kind, *words = line.split() or [""]
+            if kind == "v":
+                x, y, z = map(float, words[:3])
+                corners.append([x, y, z])
+            elif kind == "f":
+                indices = [int(word.partition("/")[0]) for word in words]
+                indices = [index - 1 if index > 0 else len(corners) + index for index in indices]
+                faces += [[indices[0], *pair] for pair in pairwise(indices[1:])]
+    except ValueError:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: line {number} is none of OBJ") from None
+    points, found = np.array(corners, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
     return _with_corners(path, points, found)
 
 
-def _with_corners(path: Path, points: Floats, triangles: Integers) -> tuple[Floats, Integers]:
+def _with_corners(path: Path, points: Floats, triangles: Integers) -> TriangleFile:
     """Corners numbered by their coordinates, as in STL: programs write one for each triangle, or for each normal."""
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(points):
         raise ParameterError("file", str(path), f"{_EXPECTED}, whose triangles name corners that are there")
-    return numbered_corners(points[triangles])[:2]
+    return _numbered(points[triangles])
 
 
 # Names of types in PLY, old and new.
@@ -197,7 +249,7 @@ _PLY_TYPES = {
 }
 
 
-def _read_ply(path: Path) -> tuple[Floats, Integers]:
+def _read_ply(path: Path) -> TriangleFile:
     """Triangles of PLY, text or binary, of faces that all have as many corners as the first, fanned out."""
     try:
         table = _ply_table(path.read_bytes())
@@ -258,7 +310,17 @@ def _ply_fields(
     return fields, count
 
 
-def _read_3mf(path: Path) -> tuple[Floats, Integers]:
+_MILLIMETRES = {
+    lib3mf.ModelUnit.MicroMeter: 1e-3,
+    lib3mf.ModelUnit.MilliMeter: 1.0,
+    lib3mf.ModelUnit.CentiMeter: 10.0,
+    lib3mf.ModelUnit.Inch: 25.4,
+    lib3mf.ModelUnit.Foot: 304.8,
+    lib3mf.ModelUnit.Meter: 1000.0,
+}
+
+
+def _read_3mf(path: Path) -> TriangleFile:
     """Meshes of all parts that are to be built, each where it stands on the platform."""
 
     _require_bounded_archive(path)
@@ -269,16 +331,21 @@ def _read_3mf(path: Path) -> tuple[Floats, Integers]:
             model.QueryReader("3mf").ReadFromFile(name)
         # Parts made of others come out as one mesh, placed.
         flat = model.MergeToModel()
-        unit = _millimetres(model.GetUnit())
+        unit = lib3mf.ModelUnit(model.GetUnit())
         objects, vertices, triangles, count = flat.GetMeshObjects(), [], [], 0
         while objects.MoveNext():
             mesh = objects.GetCurrentMeshObject()
-            vertices.append(_array(mesh.GetVertices(), "<f4").astype(np.float64) * unit)
+            vertices.append(_array(mesh.GetVertices(), "<f4").astype(np.float64) * _MILLIMETRES[unit])
             triangles.append(_array(mesh.GetTriangleIndices(), "<u4").astype(np.int64) + count)
             count += len(vertices[-1])
     except lib3mf.ELib3MFException as problem:
         raise ParameterError("file", str(path), f"{_EXPECTED}: lib3mf says {problem}") from None
-    return np.concatenate([np.zeros((0, 3)), *vertices]), np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles])
+    return TriangleFile(
+        np.concatenate([np.zeros((0, 3)), *vertices]),
+        np.concatenate([np.zeros((0, 3), dtype=np.int64), *triangles]),
+        np.zeros((0, 3)),
+        str(unit.name).lower().replace("meter", "metre"),
+    )
 
 
 def _require_bounded_archive(path: Path) -> None:
@@ -304,16 +371,3 @@ def _require_bounded_archive(path: Path) -> None:
 def _array(structures: Any, kind: str) -> NDArray[Any]:
     """The library's vertices or triangles, three numbers each, as an array."""
     return np.frombuffer(bytearray(b"".join(map(bytes, structures))), kind).reshape(-1, 3)
-
-
-def _millimetres(unit: Any) -> float:
-
-    sizes = {
-        lib3mf.ModelUnit.MicroMeter: 1e-3,
-        lib3mf.ModelUnit.MilliMeter: 1.0,
-        lib3mf.ModelUnit.CentiMeter: 10.0,
-        lib3mf.ModelUnit.Inch: 25.4,
-        lib3mf.ModelUnit.Foot: 304.8,
-        lib3mf.ModelUnit.Meter: 1000.0,
-    }
-    return sizes[lib3mf.ModelUnit(unit)]

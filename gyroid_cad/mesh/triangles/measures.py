@@ -12,11 +12,9 @@ from gyroid_cad.common.graph import connected
 from gyroid_cad.mesh.triangles.distances import locator_of, vtk_module
 
 __all__ = [
-    "Hole",
     "TriangleMeasures",
-    "holes_of",
+    "edge_uses",
     "measured_walls",
-    "open_edges",
     "shell_labels",
     "surface_places",
     "triangle_measures",
@@ -115,7 +113,7 @@ def unmatched_edges(triangles: NDArray[np.integer]) -> int:
     back, ahead = both[::2], both[1::2]
     if len(both) % 2 == 0 and np.all(back % 2 == 0) and np.all(ahead == back + 1) and np.all(np.diff(back) > 0):
         return 0
-    _, _, one_way, uses = _edge_uses(facets)
+    _, _, one_way, uses = edge_uses(facets)
     return int(np.sum((uses != 2) | (one_way != 1)))
 
 
@@ -126,8 +124,18 @@ def _edge_keys(facets: Integers) -> tuple[Integers, Booleans]:
     return low * (int(facets.max(initial=0)) + 1) + high, start < end
 
 
-def _edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
-    """Edges in an order that brings uses of one together, where each begins there, and how often it is used one way."""
+def edge_uses(facets: Integers) -> tuple[Integers, Integers, Integers, Integers]:
+    """Edges of triangles and their uses.
+
+    Returns
+    -------
+    order : ndarray of int, shape (3 triangles,)
+        Corners at which edges begin, three a triangle, so that the uses of one edge follow one another.
+    first : ndarray of int, shape (edges,)
+        Where the uses of each edge begin there.
+    one_way, uses : ndarray of int, shape (edges,)
+        How often each is used from its lower to its higher corner, and in all.
+    """
     keys, forward = _edge_keys(facets)
     order = np.argsort(keys, kind="stable")
     first = np.flatnonzero(np.diff(keys[order], prepend=-1))
@@ -159,54 +167,8 @@ def shell_labels(triangles: NDArray[np.integer]) -> Integers:
     array([0, 1, 0])
     """
     facets = np.asarray(triangles, dtype=np.int64)
-    order, first, *_ = _edge_uses(facets)
+    order, first, *_ = edge_uses(facets)
     return connected(len(facets), *_neighbours(order // 3, first))
-
-
-@dataclass(frozen=True, slots=True)
-class Hole:
-    """Edges of triangles that no other triangle shares, connected to each other."""
-
-    edges: int
-    place: tuple[float, float, float]
-
-    def __str__(self) -> str:
-        place = ", ".join(f"{round(coordinate, 3) + 0.0:g}" for coordinate in self.place)
-        return f"{self.edges} edges round ({place})"
-
-
-def holes_of(vertices: Floats, triangles: Integers) -> list[Hole]:
-    """Holes of triangles, the one with the most edges first.
-
-    Examples
-    --------
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])
-    >>> [str(hole) for hole in holes_of(corners, sides)]
-    ['3 edges round (0.333, 0.333, 0.333)']
-    """
-    edges, label = open_edges(triangles, len(vertices))
-    found = []
-    for number in range(int(label.max(initial=-1)) + 1):
-        own = edges[label == number]
-        x, y, z = vertices[np.unique(own)].mean(axis=0).tolist()
-        found.append(Hole(len(own), (x, y, z)))
-    return sorted(found, key=lambda hole: -hole.edges)
-
-
-def open_edges(triangles: Integers, count: int) -> tuple[Integers, Integers]:
-    """Edges that are used more often one way than the other, as they are used, and the hole of each."""
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    keys, back = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
-    order = np.argsort(keys, kind="stable")
-    own, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
-    others = back[order][first]
-    where = np.searchsorted(own, others).clip(max=max(len(own) - 1, 0))
-    reverse = np.where(own[where] == others, uses[where], 0)
-    found = np.repeat(edges[order][first], np.maximum(uses - reverse, 0), axis=0)
-    corners, numbers = np.unique(found, return_inverse=True)
-    ends = numbers.reshape(-1, 2)
-    return found, connected(len(corners), ends[:, 0], ends[:, 1])[ends[:, 0]] if len(found) else np.empty(0, np.int64)
 
 
 def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> TriangleMeasures:
@@ -224,7 +186,7 @@ def triangle_measures(vertices: NDArray[np.floating], triangles: NDArray[np.inte
     TriangleMeasures
     """
     points, facets = np.asarray(vertices, dtype=float), np.asarray(triangles, dtype=np.int64)
-    order, first, one_way, uses = _edge_uses(facets)
+    order, first, one_way, uses = edge_uses(facets)
     owner = order // 3
     labels = connected(len(facets), *_neighbours(owner, first))
     opened = 2 * one_way != uses

@@ -24,6 +24,7 @@ from benchmarks import (
     solid_against_sewing,
     solid_against_thickening,
     startup,
+    step_files,
     triangles,
     trimmed,
 )
@@ -41,6 +42,7 @@ BENCHMARKS = (
     random_parts,
     real_parts,
     startup,
+    step_files,
     solid_against_thickening,
     solid_against_sewing,
     memory,

@@ -290,8 +290,7 @@ class _Pieces:
         sides = self._pair(number)
         first, last = sides[0].parameters[[0, -1]].tolist()
         curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
-        ways = [partial(self._inwards, side) for side in sides]
-        tube = tube_round(curve, ways[0], ways[1], self.by, self.tolerance)
+        tube = tube_round(curve, *(partial(self._inwards, side) for side in sides), self.by, self.tolerance)
         made, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(made, tube.surface, self.place, _LEAST_TOLERANCE)
         self.builder.MakeWire(wire)
@@ -332,10 +331,11 @@ class _Pieces:
         return as_face(made.Oriented(TopAbs_FORWARD if outwards else TopAbs_REVERSED))
 
     def _lay(self, edge: TopoDS_Edge, lines: Sequence[Geom2d_Curve], surface: Geom_Surface) -> None:
-        """Have an edge lie on a surface, along one line or as its seam, as near to it as it is."""
-        curve, off = BRepAdaptor_Curve(edge), self.tolerance
+        """Have an edge lie on a surface, along one line or as its seam, as near as it is; a tube's end may be a point."""
+        off = self.tolerance
         if not BRep_Tool.Degenerated_s(edge):
             # Both are fits: together they may be apart by more than either of them.
+            curve = BRepAdaptor_Curve(edge)
             parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), _CLOSELY)
             on_lines = [derivatives(surface, plane_points(line, parameters))[0] for line in lines]
             away = on_lines - curve_points(curve, parameters)

@@ -290,7 +290,8 @@ class _Pieces:
         sides = self._pair(number)
         first, last = sides[0].parameters[[0, -1]].tolist()
         curve = BRepAdaptor_Curve(as_edge(self.edges.FindKey(number).Oriented(TopAbs_FORWARD)))
-        tube = tube_round(curve, *(partial(self._inwards, side) for side in sides), self.by, self.tolerance)
+        ways = [partial(self._inwards, side) for side in sides]
+        tube = tube_round(curve, ways[0], ways[1], self.by, self.tolerance)
         made, wire = TopoDS_Face(), TopoDS_Wire()
         self.builder.MakeFace(made, tube.surface, self.place, _LEAST_TOLERANCE)
         self.builder.MakeWire(wire)
@@ -331,15 +332,14 @@ class _Pieces:
         return as_face(made.Oriented(TopAbs_FORWARD if outwards else TopAbs_REVERSED))
 
     def _lay(self, edge: TopoDS_Edge, lines: Sequence[Geom2d_Curve], surface: Geom_Surface) -> None:
-        """Have an edge lie on a surface, along one line or as its seam, as near as it is; a tube's end may be a point."""
+        """Have an edge lie on a surface, along one line or as its seam, as near as it is; it may be a point."""
         off = self.tolerance
         if not BRep_Tool.Degenerated_s(edge):
             # Both are fits: together they may be apart by more than either of them.
             curve = BRepAdaptor_Curve(edge)
             parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), _CLOSELY)
             on_lines = [derivatives(surface, plane_points(line, parameters))[0] for line in lines]
-            away = on_lines - curve_points(curve, parameters)
-            off = max(off, float(np.linalg.norm(away, axis=-1).max()))
+            off = max(off, float(np.linalg.norm(on_lines - curve_points(curve, parameters), axis=-1).max()))
         self.builder.UpdateEdge(edge, *lines, surface, self.place, _MARGIN * off)
         for end in parts_of(edge, TopAbs_VERTEX):
             self.builder.UpdateVertex(as_vertex(end), _MARGIN * off)

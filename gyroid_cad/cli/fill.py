@@ -53,6 +53,7 @@ from gyroid_cad.errors import KernelError, ParameterError
 __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
+SURFACE = KINDS[-1]
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
     *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
@@ -189,6 +190,8 @@ def fill_command(
     if settings["route"] == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         settings["deviation"], written = given["deviation"], {}
+    elif given["kind"] == SURFACE:
+        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
     elif given["fillet"] is not None:
         accepted = "none at --route brep, whose solids have sharp corners there; --route triangles rounds them"
         raise ParameterError("fillet", given["fillet"], accepted)

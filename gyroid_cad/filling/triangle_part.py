@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import signed_volumes
+from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import ROUTES, Kind, Route
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
+from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_meshing
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.part import shapes_of, solid_names
 from gyroid_cad.filling.wanted import SURFACE
 from gyroid_cad.kernel.check import compound_of, volume_of
 from gyroid_cad.kernel.part import face_numbers, points_within
-from gyroid_cad.kernel.repair import chosen_solids
+from gyroid_cad.kernel.repair import chosen_solids, require_volume
 from gyroid_cad.kernel.stl import solid_triangles
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.distances import SignedDistances
@@ -30,7 +31,16 @@ from gyroid_cad.mesh.triangles.faults import Hole, holes_of, open_edges
 from gyroid_cad.mesh.triangles.files import read_triangles
 from gyroid_cad.mesh.triangles.spread import spread_points
 
-__all__ = ["TrianglePart", "is_triangles", "mended", "naming_triangles", "require_route", "sound_body", "triangle_part"]
+__all__ = [
+    "TrianglePart",
+    "is_triangles",
+    "mended",
+    "naming_triangles",
+    "require_deviation",
+    "require_route",
+    "sound_body",
+    "triangle_part",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -44,7 +54,7 @@ _MOST_LOST, _FINEST = 3e-4, 0.02
 _CLOSENESS = 1e-6
 # Of what several solids hold together: less in common may be rounding, where they touch.
 _SHARED = 1e-6
-# Of the same, what is no solid.
+# Of the same, and of the box round triangles, what is no solid.
 _NOTHING = 1e-12
 # What is expected at the route of exact solids, of what it has no use for.
 _AT_BREP = {
@@ -188,7 +198,9 @@ def triangle_part(
         if solid_names(solids):
             raise ParameterError("solids", solids, "none of a file of triangles, whose solids have no names")
         return TrianglePart(*_body_of_file(given, repair))
-    shape = compound_of(solid for _, solid in chosen_solids(*shapes_of(given), solid_names(solids)))
+    named = chosen_solids(*shapes_of(given), solid_names(solids))
+    require_volume(named)
+    shape = compound_of(solid for _, solid in named)
     meshes = solid_triangles(shape, deviation)
     if closely and (lost := _lost(shape, meshes)) > _MOST_LOST:
         meshes = solid_triangles(shape, deviation * max(_MOST_LOST / lost, _FINEST) / 2)
@@ -228,7 +240,7 @@ def _body_of_file(path: str | os.PathLike[str], repair: bool) -> tuple[Body, tup
     body, remarks = sound_body(vertices, triangles)
     if body is None and repair:
         body, remarks = mended(vertices, triangles)
-    if body is None or not body.volume > 0:
+    if body is None or not body.volume > _NOTHING * np.prod(np.ptp(vertices, axis=0)):
         way_out = "" if repair else "; repair closes them"
         raise ParameterError("part", str(path), f"closed triangles: {_said(holes_of(vertices, triangles))}{way_out}")
     return body, remarks
@@ -254,6 +266,19 @@ def require_route(route: Route, **given: Any) -> None:
     for name, value in given.items():
         if route == ROUTES[0] and value not in (None, False):
             raise ParameterError(name, value, _AT_BREP[name])
+
+
+def require_deviation(deviation: float | None, cell_size: float) -> None:
+    """Check a deviation, if one is given: with one as large as a cell, little of part and lattice would be left.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if deviation is not None:
+        require_meshing(finite_number("deviation", deviation))
+        if deviation >= cell_size:
+            raise ParameterError("deviation", deviation, f"a length below the cell size, {cell_size:g} mm")
 
 
 def sound_body(vertices: Floats, triangles: Integers) -> tuple[Body | None, tuple[str, ...]]:
@@ -321,12 +346,10 @@ def mended(vertices: Floats, triangles: Integers) -> tuple[Body | None, tuple[st
     vertices, triangles = vertices[first], label[triangles]
     triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    doubled = len(triangles) - len(first)
     triangles, turned = _turned_alike(triangles[np.sort(first)])
-    remarks = [
-        f"{_counted(number, what)} {done}"
-        for number, what, done in ((welded, "corner", "welded"), (turned, "triangle", "turned"))
-        if number
-    ]
+    mends = (welded, "corner", "welded"), (doubled, "triangle", "on others left out"), (turned, "triangle", "turned")
+    remarks = [f"{_counted(number, what)} {done}" for number, what, done in mends if number]
     holes = holes_of(vertices, triangles)
     if holes:
         remarks.append(f"{_counted(len(holes), 'hole')} closed, {'the largest of ' * (len(holes) > 1)}{holes[0]}")

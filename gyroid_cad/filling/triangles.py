@@ -11,16 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Kind, Route
-from gyroid_cad.common.formats import STL, THREE_MF, TRIANGLE_FORMATS, format_of, require_formats, require_meshing
+from gyroid_cad.common.formats import STL, THREE_MF, TRIANGLE_FORMATS, format_of, require_formats
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import KernelError, ParameterError, PartWarning
 from gyroid_cad.filling.distance_skin import Shell, opened_facets, without_small_voids
 from gyroid_cad.filling.fillet import require_narrower, rounded
 from gyroid_cad.filling.infill import Infill, InfillIn
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
-from gyroid_cad.filling.triangle_part import TrianglePart, triangle_part
+from gyroid_cad.filling.triangle_part import TrianglePart, require_deviation, triangle_part
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Region
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
@@ -276,8 +275,7 @@ class TriangleJob:
         """
         if self.kind == SURFACE:
             raise ParameterError("kind", self.kind, "one that bounds a volume to print: a bare surface has none")
-        if self.deviation is not None:
-            require_meshing(finite_number("deviation", self.deviation))
+        require_deviation(self.deviation, self.cell_size)
         seconds: dict[str, float] = {}
         with timed(seconds, "part", self.progress):
             whole = triangle_part(given, solids, self._fineness, repair, closely=self.deviation is None)

@@ -134,6 +134,8 @@ def regions_of(
         return Regions((Region(SURFACE, None, None, surface=True),), thickness=0.0)
     require_one(thickness, density)
     if kind in (NETWORK_A, NETWORK_B):
+        if thickness is not None:
+            raise ParameterError("thickness", thickness, "none of a network, which is told by its density")
         return _network(kind, cell_size, density, tube)
     regions = (
         (Region("channel-a", 1.0, None, fluid=True), Region("channel-b", None, -1.0, fluid=True))

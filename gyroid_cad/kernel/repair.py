@@ -23,12 +23,14 @@ from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology, v
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_shell
 from gyroid_cad.kernel.extent import box_round, corners_of
 
-__all__ = ["chosen_solids", "fault_of", "separate_solids"]
+__all__ = ["chosen_solids", "fault_of", "require_volume", "separate_solids"]
 
 # Gaps between faces that are sewn up, in parts of the largest extent.
 _SEWN = 1e-5
 # Of two solids, in parts of the smaller one: less in common may be rounding, where they touch.
 _SHARED = 1e-6
+# Of the box round a solid: what holds less than this share of it holds nothing.
+_NOTHING = 1e-9
 # Solids that a message lists.
 _MOST_LISTED = 12
 
@@ -142,7 +144,33 @@ def fault_of(solid: TopoDS_Shape, which: str) -> str:
         return f"a closed solid: {which} has {open_edges} open edges{_first_open(solid)}"
     if not is_valid(solid):
         return f"a valid solid: the kernel finds fault with {which}{_first_invalid(solid)}"
+    if _holds_nothing(solid):
+        return f"a solid of positive volume: {which} holds nothing, for its faces lie on one another"
     return "" if volume_of(solid) > 0 else f"a solid of positive volume: {which} is inside out"
+
+
+def require_volume(solids: Sequence[Named]) -> None:
+    """Check that every solid, with what to call it, holds something, if it is sound or not.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for title, solid in solids:
+        if solid.ShapeType() == TopAbs_SOLID and _holds_nothing(solid):
+            _require_sound(solid, title)
+
+
+def _holds_nothing(solid: TopoDS_Shape) -> bool:
+    """Tell whether faces lie on one another, with nothing between them, though the kernel calls the solid valid.
+
+    Such is what it reads of an ellipse turned round its axis: of the half that was turned it wrote the whole.
+    """
+    volume = GProp_GProps()
+    # At fixed points, which are the same on both sides of such faces: they cancel to rounding.
+    BRepGProp.VolumeProperties_s(solid, volume)
+    box = float(np.prod(np.ptp(corners_of(box_round([solid])), axis=0)))
+    return bool(abs(volume.Mass()) <= _NOTHING * box)
 
 
 def _repaired(shape: TopoDS_Shape) -> list[TopoDS_Shape]:

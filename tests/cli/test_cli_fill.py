@@ -125,6 +125,14 @@ def test_the_bare_surface_is_written_as_shells(capsys: Captured, block: Path) ->
     assert topology(shape).faces == json.loads(done.out)["faces"]
 
 
+def test_the_bare_surface_is_refused_as_triangles_before_anything_is_filled(capsys: Captured, block: Path) -> None:
+    done = run(capsys, block, "-o", block.with_name("a.stl"), *FILL, "--kind", "surface", "--route", "brep")
+    assert done.status == 2
+    assert done.err.splitlines() == [
+        f"gyroid-cad: error: -o = '{block.with_name('a.stl')}': expected a file name ending in .step, .stp or .brep"
+    ]
+
+
 @pytest.mark.parametrize(("unit", "length"), [("INCH", 25.4), ("MM", 1.0)])
 def test_lengths_in_a_file_are_what_its_unit_says(capsys: Captured, tmp_path: Path, unit: str, length: float) -> None:
     path = tmp_path / "part.step"

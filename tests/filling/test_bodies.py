@@ -134,3 +134,11 @@ def test_what_cannot_be_mended_is_refused_for_a_face_and_a_place() -> None:
     one_missing = cq.Workplane(obj=cq.Compound.makeCompound([cube(20).val(), unsewn(5)]))
     with pytest.raises(ParameterError, match=r"solid 2 of 2 has 20 open edges, the first on face 1 at \(0, 0, 2\) mm"):
         filled(one_missing)
+
+
+@pytest.mark.parametrize("route", ["brep", "triangles"])
+def test_a_solid_whose_faces_lie_on_one_another_holds_nothing_to_fill(route: Any, tmp_path: Path) -> None:
+    half = cq.Workplane().ellipseArc(14, 8, -90, 90, rotation_angle=0, startAtCurrent=False).close()
+    cq.exporters.export(half.revolve(360, (0, -8, 0), (0, 8, 0)), str(tmp_path / "egg.step"))
+    with pytest.raises(ParameterError, match="of positive volume: its solid holds nothing, for its faces lie on one"):
+        filled(tmp_path / "egg.step", route=route)

@@ -73,6 +73,22 @@ def test_corners_that_nearly_meet_are_welded() -> None:
     assert "corners welded" in remarks[0]
 
 
+def test_triangles_that_are_all_apart_are_no_part_once_each_is_closed_by_its_back(tmp_path: Path) -> None:
+    vertices, triangles = cube()
+    corners = vertices[triangles]
+    apart = 0.9 * corners + 0.1 * corners.mean(axis=1, keepdims=True)
+    trimesh.Trimesh(apart.reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)).export(tmp_path / "soup.stl")
+    with pytest.raises(ParameterError, match=f"expected closed triangles: there are {len(triangles)} holes"):
+        triangle_part(tmp_path / "soup.stl", (), 0.1, repair=True)
+
+
+def test_triangles_that_lie_on_others_are_left_out_and_counted() -> None:
+    vertices, triangles = cube()
+    body, remarks = mended(vertices, np.concatenate([triangles, triangles[:5]]))
+    assert body is not None
+    assert (round(body.volume, 9), remarks) == (8.0, ("5 triangles on others left out",))
+
+
 def test_cubes_that_touch_in_an_edge_are_a_body_and_those_that_overlap_are_united() -> None:
     vertices, triangles = cube()
     beside = vertices + np.array([2.0, 2.0, 0.0])

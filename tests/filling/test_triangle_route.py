@@ -131,6 +131,7 @@ def test_a_part_far_from_the_origin_keeps_its_digits_and_files_of_single_precisi
         ({"kind": "surface", "density": None}, "kind = 'surface': expected one that bounds a volume"),
         ({"route": "mesh"}, "route = 'mesh': expected brep or triangles"),
         ({"deviation": -1.0}, "deviation = -1.0: expected a length above 0 mm"),
+        ({"deviation": 1000.0}, "deviation = 1000.0: expected a length below the cell size"),
         ({"route": "brep"}, "deviation = 0.02: expected none at route brep"),
     ],
 )

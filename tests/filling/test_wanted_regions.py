@@ -68,6 +68,11 @@ def test_a_networks_density_is_one_number_in_whatever_form_a_door_hands_it_over(
     assert regions_of(NETWORK_A, L, None, given, TUBE) == regions_of(NETWORK_A, L, None, 0.4, TUBE)
 
 
+def test_a_network_has_no_thickness() -> None:
+    with pytest.raises(ParameterError, match=r"thickness = 1.0: expected none of a network"):
+        regions_of(NETWORK_A, L, 1.0, None, TUBE)
+
+
 @pytest.mark.parametrize("given", ["0.3 + 0.01*x", "0.01", "1.2", "nan", True, None])
 def test_a_networks_density_that_varies_or_leaves_its_range_is_refused_with_the_range(given: Any) -> None:
     with pytest.raises(ParameterError, match="density"):

@@ -205,19 +205,23 @@ def _distinct(flat: NDArray[Real]) -> tuple[Integers, Integers]:
 
 def _read_obj(path: Path) -> TriangleFile:
     """Triangles of OBJ, larger polygons fanned out; corners counted from 1, or backwards from the last one, below 0."""
-    corners: list[list[str]] = []
+    corners: list[list[float]] = []
     faces: list[list[int]] = []
+    number = 0
     try:
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("v "):
-                corners.append(line.split()[1:4])
-            elif line.startswith("f "):
-                numbers = [int(word.partition("/")[0]) for word in line.split()[1:]]
-                numbers = [number - 1 if number > 0 else len(corners) + number for number in numbers]
-                faces += [[numbers[0], *pair] for pair in pairwise(numbers[1:])]
-        points, found = np.array(corners, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
-    except ValueError as problem:
-        raise ParameterError("file", str(path), f"{_EXPECTED}: {problem}") from None
+            number += 1
+            kind, *words = line.split() or [""]
+            if kind == "v":
+                x, y, z = map(float, words[:3])
+                corners.append([x, y, z])
+            elif kind == "f":
+                indices = [int(word.partition("/")[0]) for word in words]
+                indices = [index - 1 if index > 0 else len(corners) + index for index in indices]
+                faces += [[indices[0], *pair] for pair in pairwise(indices[1:])]
+    except ValueError:
+        raise ParameterError("file", str(path), f"{_EXPECTED}: line {number} is none of OBJ") from None
+    points, found = np.array(corners, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
     return _with_corners(path, points, found)
 
 

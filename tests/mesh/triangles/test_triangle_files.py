@@ -78,6 +78,12 @@ def test_3mf_says_its_unit_and_where_its_parts_stand(
     assert triangle_measures(vertices, triangles).volumes == pytest.approx(2 * [6 * millimetres**3])
 
 
+def test_words_of_obj_may_be_parted_by_tabs(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v\t0 0 0\nv 1 0 0\n v 0\t1 0\n\nf\t1/1 2/2 3/3\n")
+    assert read_triangles(path)[1].tolist() == [[0, 1, 2]]
+
+
 def test_triangles_without_area_are_left_out(tmp_path: Path) -> None:
     path = tmp_path / "a.stl"
     corners = np.concatenate([BOX.triangles, BOX.triangles[:1, [0, 0, 1]]])
@@ -95,6 +101,8 @@ def test_triangles_without_area_are_left_out(tmp_path: Path) -> None:
         ("a.stl", b"solid\nvertex 1 2\n", "a file of triangles"),
         ("a.stl", b"solid\nvertex 0 0 nan\nvertex 1 0 0\nvertex 0 1 0\n", "of finite size"),
         ("a.3mf", b"PK no archive", "no sound zip archive"),
+        ("a.obj", b"v 0 0 0\nv 1 0", "line 2 is none of OBJ"),
+        ("a.obj", b"v 0 0 0\nf 1 two 3\n", "line 2 is none of OBJ"),
         ("gone.stl", None, "No such file"),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,8 +9,8 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.check import checked_files, print_file_checks, require_unbroken
-from gyroid_cad.cli.console import print_check_table, print_report, shown_progress
+from gyroid_cad.cli.check import checked_files, print_made
+from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import (
     PAPER_OPTIONS,
     density_of,
@@ -200,18 +199,7 @@ def fill_command(
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = file_sizes(output)
-    if check is not None:
-        summary["print_check"] = check.as_dict()
-    if given["check"]:
-        summary["checks"] = [one.as_dict() for one in of_files]
-    if as_json:
-        click.echo(json.dumps(summary))
-    elif not quiet:
-        print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
-        if check is not None:
-            print_check_table(check)
-        print_file_checks(of_files)
-    require_unbroken(of_files)
+    print_made(filled.report.rows(), summary, check, of_files, as_json, quiet)
 
 
 def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:

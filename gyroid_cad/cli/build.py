@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gyroid_cad.cli.check import checked_files, print_file_checks, require_unbroken
-from gyroid_cad.cli.console import print_check_table, print_report, shown_progress
+from gyroid_cad.cli.check import checked_files, print_made
+from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, printed_options
 from gyroid_cad.cli.options import (
     angle_option,
@@ -99,18 +98,7 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
         check = None if checked is None else checked(lattice, given["deviation"], progress)
         of_files = checked_files(outputs if given["check"] else (), progress)
     summary = _summary(report, outputs, time.perf_counter() - start)
-    if check is not None:
-        summary["print_check"] = check.as_dict()
-    if given["check"]:
-        summary["checks"] = [one.as_dict() for one in of_files]
-    if as_json:
-        click.echo(json.dumps(summary))
-    elif not quiet:
-        print_report(report.rows(), summary["files"], summary["seconds"]["total"])
-        if check is not None:
-            print_check_table(check)
-        print_file_checks(of_files)
-    require_unbroken(of_files)
+    print_made(report.rows(), summary, check, of_files, as_json, quiet)
 
 
 def _summary(

@@ -6,11 +6,11 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gyroid_cad.cli.console import print_table, shown_progress
+from gyroid_cad.cli.console import print_check_table, print_report, print_table, shown_progress
 from gyroid_cad.cli.options import file_paths, json_option
 from gyroid_cad.common.choices import PROFILES
 from gyroid_cad.common.memory import require_libraries
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from gyroid_cad.builds.file_check import FileCheck
     from gyroid_cad.common.choices import Profile
     from gyroid_cad.common.progress import Progress
+    from gyroid_cad.common.tables import Rows
+    from gyroid_cad.printing.verdict import PrintCheck
 
-__all__ = ["check_command", "checked_files", "print_file_checks", "require_unbroken"]
+__all__ = ["check_command", "checked_files", "print_made"]
 
 
 def checked_files(paths: Sequence[str], progress: Progress | None, profile: Profile = "default") -> list[FileCheck]:
@@ -31,14 +33,42 @@ def checked_files(paths: Sequence[str], progress: Progress | None, profile: Prof
     return [check_file(path, profile, named_progress(progress, path)) for path in paths]
 
 
-def print_file_checks(checks: Sequence[FileCheck]) -> None:
-    """Print what was found in each file, under its name."""
-    for check in checks:
-        print_table((check.file, *check.header()[1:]), check.rows())
+def print_made(
+    rows: Rows,
+    summary: dict[str, Any],
+    check: PrintCheck | None,
+    of_files: Sequence[FileCheck],
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Print what was made and what its checks found; leave with status 1 if a limit is broken in one of the files.
+
+    Parameters
+    ----------
+    rows : list of (str, str)
+        Of the report.
+    summary : dict
+        The same for JSON, with the files and the seconds in all.
+    check : PrintCheck, optional
+    of_files : sequence of FileCheck
+    as_json, quiet : bool
+    """
+    if check is not None:
+        summary["print_check"] = check.as_dict()
+    if of_files:
+        summary["checks"] = [one.as_dict() for one in of_files]
+    if as_json:
+        click.echo(json.dumps(summary))
+    elif not quiet:
+        print_report(rows, summary["files"], summary["seconds"]["total"])
+        if check is not None:
+            print_check_table(check)
+        for one in of_files:
+            print_table((one.file, *one.header()[1:]), one.rows())
+    _require_unbroken(of_files)
 
 
-def require_unbroken(checks: Sequence[FileCheck]) -> None:
-    """Leave with status 1 if a limit is broken in one of the files."""
+def _require_unbroken(checks: Sequence[FileCheck]) -> None:
     if not all(check.ok for check in checks):
         click.get_current_context().exit(1)
 
@@ -76,4 +106,4 @@ def check_command(file: str, profile: Profile, as_json: bool, quiet: bool) -> No
         click.echo(json.dumps(check.as_dict()))
     elif not quiet:
         print_table(check.header(), [*check.rows(), ("time", f"{time.perf_counter() - start:.2f} s", "", "", "")])
-    require_unbroken([check])
+    _require_unbroken([check])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,8 +9,8 @@ from typing import Any
 
 import click
 
-from gyroid_cad.cli.check import checked_files, print_file_checks, require_unbroken
-from gyroid_cad.cli.console import print_check_table, print_report, shown_progress
+from gyroid_cad.cli.check import checked_files, print_made
+from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import (
     PAPER_OPTIONS,
     density_of,
@@ -186,15 +185,9 @@ def fill_command(
     written = {name: given[name] for name in ("schema", "deviation", "angle")}
     require_settings((1, 1, 1), **written)
     checked = None if printer is None else check_by(printer)
-    settings["route"] = _route(part, given["route"], output)
+    settings["route"] = _route(part, given, output)
     if settings["route"] == TRIANGLES:
-        require_formats(output, TRIANGLE_FORMATS)
         settings["deviation"], written = given["deviation"], {}
-    elif given["kind"] == SURFACE:
-        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
-    elif given["fillet"] is not None:
-        accepted = "none at --route brep, whose solids have sharp corners there; --route triangles rounds them"
-        raise ParameterError("fillet", given["fillet"], accepted)
     with shown_progress(not quiet, lines=True) as progress:
         try:
             filled = fill(part, progress=progress, **settings)
@@ -206,32 +199,30 @@ def fill_command(
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = file_sizes(output)
-    if check is not None:
-        summary["print_check"] = check.as_dict()
-    if given["check"]:
-        summary["checks"] = [one.as_dict() for one in of_files]
-    if as_json:
-        click.echo(json.dumps(summary))
-    elif not quiet:
-        print_report(filled.report.rows(), summary["files"], summary["seconds"]["total"])
-        if check is not None:
-            print_check_table(check)
-        print_file_checks(of_files)
-    require_unbroken(of_files)
+    print_made(filled.report.rows(), summary, check, of_files, as_json, quiet)
 
 
-def _route(part: str, chosen: Route | None, output: Sequence[str]) -> Route:
+def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
     """Return the route to take: the one that was chosen, or triangles where nothing but triangles is written.
 
     Raises
     ------
     ParameterError
+        If it does not lead from the part, with what else is given, to the files.
     """
     formats = {format_of(path) for path in output}
-    route = chosen or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
-    if route == BREP and format_of(part) in TRIANGLE_FORMATS:
+    route: Route = given["route"] or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
+    if route == TRIANGLES:
+        require_formats(output, TRIANGLE_FORMATS)
+        return route
+    if format_of(part) in TRIANGLE_FORMATS:
         accepted = f"a STEP or BREP file; triangles fill by --route triangles, into {listed_endings(TRIANGLE_FORMATS)}"
         raise ParameterError("part", part, accepted)
+    if given["kind"] == SURFACE:
+        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
+    if given["fillet"] is not None:
+        accepted = "none at --route brep, whose solids have sharp corners there; --route triangles rounds them"
+        raise ParameterError("fillet", given["fillet"], accepted)
     return route
 
 

@@ -33,6 +33,7 @@ _TOUCHES = 1e-7
 # Places along each parameter of a face where its curvature is looked at.
 _GRID = 9
 _SPLINES_AT_ONCE = 64
+_NO_TRIANGLES = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty(0, np.int64)
 
 
 def face_quality(sampled: SampledShape, areas: Floats) -> dict[str, Worst]:
@@ -91,6 +92,8 @@ def _knot_distance(splines: Splines) -> tuple[float, Floats]:
 def _triangles(sampled: SampledShape) -> tuple[Floats, Integers, Integers]:
     """Triangles of the faces of a shape, and the face of each; none where they cannot be made."""
     deviation = max(_DEVIATION * diagonal(sampled.shape), _FINEST)
+    if not sampled.faces:
+        return _NO_TRIANGLES
     try:
         made = face_triangles(sampled.faces, deviation, radians(_ANGLE), (sampled.surfaces, sampled.borders))
         return made.vertices, made.triangles, made.faces
@@ -99,7 +102,7 @@ def _triangles(sampled: SampledShape) -> tuple[Floats, Integers, Integers]:
     try:
         return meshed_by_face(compound_of(sampled.faces), "the check", deviation, _ANGLE)
     except ExportError:
-        return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty(0, np.int64)
+        return _NO_TRIANGLES
 
 
 def _narrowest(sampled: SampledShape, areas: Floats) -> Worst:

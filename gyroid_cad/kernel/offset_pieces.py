@@ -332,14 +332,14 @@ class _Pieces:
         return as_face(made.Oriented(TopAbs_FORWARD if outwards else TopAbs_REVERSED))
 
     def _lay(self, edge: TopoDS_Edge, lines: Sequence[Geom2d_Curve], surface: Geom_Surface) -> None:
-        """Have an edge lie on a surface, along one line or as its seam, as near to it as it is."""
-        curve, off = BRepAdaptor_Curve(edge), self.tolerance
+        """Have an edge lie on a surface, along one line or as its seam, as near as it is; it may be a point."""
+        off = self.tolerance
         if not BRep_Tool.Degenerated_s(edge):
             # Both are fits: together they may be apart by more than either of them.
+            curve = BRepAdaptor_Curve(edge)
             parameters = np.linspace(curve.FirstParameter(), curve.LastParameter(), _CLOSELY)
             on_lines = [derivatives(surface, plane_points(line, parameters))[0] for line in lines]
-            away = on_lines - curve_points(curve, parameters)
-            off = max(off, float(np.linalg.norm(away, axis=-1).max()))
+            off = max(off, float(np.linalg.norm(on_lines - curve_points(curve, parameters), axis=-1).max()))
         self.builder.UpdateEdge(edge, *lines, surface, self.place, _MARGIN * off)
         for end in parts_of(edge, TopAbs_VERTEX):
             self.builder.UpdateVertex(as_vertex(end), _MARGIN * off)

@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.gp import gp_Pnt2d, gp_Vec2d
-from OCP.TopAbs import TopAbs_REVERSED
+from OCP.Standard import Standard_Failure
+from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
 from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.common.verdicts import Worst, counted
+from gyroid_cad.errors import ExportError, KernelError
 from gyroid_cad.kernel.apart import read_shape
 from gyroid_cad.kernel.borders import FaceBorders
-from gyroid_cad.kernel.check import is_valid, measure_about, topology
+from gyroid_cad.kernel.check import is_valid, measure_about, parts_of, topology
 from gyroid_cad.kernel.edge_quality import edge_quality
 from gyroid_cad.kernel.face_quality import face_quality
 from gyroid_cad.kernel.sampled import SampledShape
@@ -69,10 +71,18 @@ def file_quality(path: str | os.PathLike[str], progress: Progress | None = None)
     Raises
     ------
     ExportError
-        If it cannot be read or holds no shape.
+        If it cannot be read or holds no face.
+    KernelError
+        If the kernel fails at it.
     """
     report_progress(progress, "read", 0, 1)
-    return shape_quality(read_shape(path), progress)
+    shape = read_shape(path)
+    if next(parts_of(shape, TopAbs_FACE), None) is None:
+        raise ExportError(f"{path} holds no face: there is nothing to check")
+    try:
+        return shape_quality(shape, progress)
+    except Standard_Failure as failed:
+        raise KernelError(f"{path} could not be checked: the kernel failed: {failed}") from failed
 
 
 def shape_quality(shape: TopoDS_Shape, progress: Progress | None = None) -> ShapeQuality:

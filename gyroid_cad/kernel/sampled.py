@@ -135,8 +135,8 @@ class SampledShape:
         np.maximum.at(largest, face, sizes)
         turned = np.array([one.Orientation() == TopAbs_REVERSED for one in self.faces], dtype=bool)
         signs = np.where(turned, -1.0, 1.0)[face] * (sizes > _NO_NORMAL * largest[face])
-        shape = (count, _PLACES, -1)
-        return places.reshape(shape), found.reshape(shape), (unit(normals) * signs[:, np.newaxis]).reshape(shape)
+        outwards = unit(normals) * signs[:, np.newaxis]
+        return places.reshape(count, _PLACES, 2), found.reshape(count, _PLACES, 3), outwards.reshape(count, _PLACES, 3)
 
 
 def _closing(faces: Sequence[TopoDS_Face]) -> tuple[list[TopoDS_Face], list[TopoDS_Face]]:

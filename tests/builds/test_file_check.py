@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeVertex
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeChamfer
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Pln, gp_Pnt
 from OCP.TopAbs import TopAbs_EDGE
 
 from gyroid_cad import ExportError, Lattice, ParameterError, check_file
@@ -130,6 +132,16 @@ def test_what_is_inside_out_turned_over_crossing_or_flat_is_told_of_a_mesh(tmp_p
     for name, mesh in made.items():
         mesh.export(tmp_path / "mesh.stl")
         assert broken(tmp_path / "mesh.stl") == {name}
+
+
+def test_what_has_no_face_or_no_border_is_told(tmp_path: Path) -> None:
+    write_brep(BRepBuilderAPI_MakeVertex(gp_Pnt(0, 0, 0)).Vertex(), tmp_path / "point.brep")
+    with pytest.raises(ExportError, match=r"point\.brep holds no face: there is nothing to check"):
+        check_file(tmp_path / "point.brep")
+    write_brep(BRepBuilderAPI_MakeFace(gp_Pln()).Face(), tmp_path / "plane.brep")
+    assert broken(tmp_path / "plane.brep") == {"solids", "open borders"}
+    write_brep(BOX.Reversed(), tmp_path / "reversed.brep")
+    assert broken(tmp_path / "reversed.brep") == {"inside out"}
 
 
 def test_bad_input_is_told_in_a_line(tmp_path: Path) -> None:

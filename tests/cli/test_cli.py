@@ -31,7 +31,17 @@ Captured = pytest.CaptureFixture[str]
 KEYS = [
     *("cells", "cell_size", "cells_alike", "thickness", "min_thickness", "max_thickness", "density"),
     *("patches", "faces", "solids", "islands", "islands_volume", "dropped", "dropped_volume"),
-    *("control_points", "valid", "closed", "boundary_edges", "non_manifold_edges", "volume", "volume_exact", "area"),
+    *(
+        "control_points",
+        "valid",
+        "closed",
+        "checked_by",
+        "boundary_edges",
+        "non_manifold_edges",
+        "volume",
+        "volume_exact",
+        "area",
+    ),
     *("max_deviation", "max_wall_error", "max_normal_angle", "samples_per_patch", "seconds", "files"),
 ]
 ONE_CELL = ["--cells", "1", "1", "1", "--cell-size", "10"]

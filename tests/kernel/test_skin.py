@@ -25,6 +25,7 @@ from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.depth import Depths
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.offset import CLOSED_WAYS, offsets
+from gyroid_cad.kernel.offset_pieces import offset_pieces
 from gyroid_cad.kernel.part import Part, measure, require_part
 from gyroid_cad.kernel.skin import Hollow, hollow, hollow_round, openings_of
 from gyroid_cad.kernel.solid import build_faces
@@ -307,6 +308,15 @@ def test_one_way_that_fails_does_not_keep_the_next_from_being_tried() -> None:
     assert nothing is None
     assert core is not None
     assert measure(core)[0] == pytest.approx(7 * 6 * 5)
+
+
+def test_a_tube_round_an_edge_that_becomes_smooth_ends_in_a_point() -> None:
+    hole = bd.loft([bd.Rectangle(6, 6).face(), bd.Pos(0, 0, 8) * bd.Circle(2.5).face()])
+    block = bd.Pos(0, 0, 4) * bd.Box(12, 12, 8) - hole
+    pieces, _ = offset_pieces(block.solid().wrapped, 0.8, ())
+    # Four edges run up the hole, corners below and smooth at the circle.
+    assert len(pieces) == len(block.faces()) + 4
+    assert all(map(is_valid, pieces))
 
 
 def test_a_part_is_as_deep_as_the_largest_ball_in_it() -> None:

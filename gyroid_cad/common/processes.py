@@ -20,12 +20,14 @@ from typing import Any, Protocol, TypeVar, cast
 
 from gyroid_cad.errors import KernelError
 
-__all__ = ["Started", "beside", "can_fork", "processors", "results_of", "started"]
+__all__ = ["Started", "beside", "can_fork", "processors", "results_of", "slowed", "started"]
 
 T = TypeVar("T")
 
 # Of prctl(2): the signal that a process gets when the one that started it ends.
 _SET_SIGNAL_AT_PARENTS_END = 1
+# Times longer that work may be thought to take: a load may be that of a large machine of which this is a part.
+_MOST_SLOWED = 5.0
 
 
 class Started(Protocol):
@@ -62,6 +64,16 @@ def can_fork() -> bool:
 def processors() -> int:
     """Count the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def slowed() -> float:
+    """Tell how many times longer work takes than it does alone, as others want the processors too: from 1 to 5.
+
+    What is given a while to finish gets more of it, for it is to come out the same on a busy machine.
+    """
+    if not hasattr(os, "getloadavg"):
+        return 1.0
+    return min(max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)), _MOST_SLOWED)
 
 
 def results_of(

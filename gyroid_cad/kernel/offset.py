@@ -32,7 +32,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, 
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
-from gyroid_cad.common.processes import Started, started
+from gyroid_cad.common.processes import Started, slowed, started
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.check import compound_of, is_valid, parts_of, topology
 from gyroid_cad.kernel.compat import ShapeList, as_edge, as_face, as_solid
@@ -87,14 +87,16 @@ def offsets(
     numbers = [k for k, face in enumerate(parts_of(solid, TopAbs_FACE)) if any(face.IsSame(one) for one in openings)]
     with TemporaryDirectory() as folder:
         BinTools.Write_s(solid, str(Path(folder, _SOLID)))
-        left, ends = list(ways), time.monotonic() + _SECONDS_OF_KERNEL
+        left, slower = list(ways), slowed()
+        ends = time.monotonic() + slower * _SECONDS_OF_KERNEL
         while left:
             process = started(work, folder, repr(skin), ",".join(map(str, numbers)), *left)
             try:
                 while left:
                     begun, of_kernel = time.monotonic(), left[0] not in _OF_PIECES
-                    at_most = max(_LEAST_SECONDS, ends - begun) if of_kernel else _SECONDS_AT_MOST
-                    found = _awaited(process, Path(folder, left[0]), min(at_most, seconds, _SECONDS_AT_MOST))
+                    longest = slower * min(seconds, _SECONDS_AT_MOST)
+                    at_most = min(max(_LEAST_SECONDS, ends - begun), longest) if of_kernel else longest
+                    found = _awaited(process, Path(folder, left[0]), at_most)
                     # All of the kernel's own ways together may take so long.
                     ends += 0.0 if of_kernel else time.monotonic() - begun
                     if found is None:
@@ -102,7 +104,7 @@ def offsets(
                     left.pop(0)
                     yield _read(found) if found.stat().st_size else None
                 if left and left[0] in _OF_PIECES and reasons is not None and process.wait(0) is None:
-                    reasons.append(f"its faces' offsets were not cut against each other in {_SECONDS_AT_MOST:g} s")
+                    reasons.append(f"its faces' offsets were not cut against each other in {longest:.3g} s")
             finally:
                 process.kill()
             if left:

@@ -11,7 +11,7 @@ from pathlib import Path
 import errands
 import pytest
 
-from gyroid_cad.common.processes import beside, can_fork, processors, started
+from gyroid_cad.common.processes import beside, can_fork, processors, slowed, started
 from gyroid_cad.errors import KernelError, ParameterError
 
 PATIENCE = 60.0
@@ -70,3 +70,11 @@ def test_work_beside_whose_result_nobody_waits_for_is_ended() -> None:
     with beside(signal.pause, "sleeps"):
         pass
     assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize(("load", "times"), [(0.0, 1.0), (1.0, 1.0), (3.0, 3.0), (100.0, 5.0)])
+def test_work_takes_longer_where_more_of_it_wants_the_processors_than_there_are(
+    monkeypatch: pytest.MonkeyPatch, load: float, times: float
+) -> None:
+    monkeypatch.setattr(os, "getloadavg", lambda: (load * (os.cpu_count() or 1), 0.0, 0.0), raising=False)
+    assert slowed() == pytest.approx(times)

@@ -302,6 +302,16 @@ def test_a_way_that_crashes_or_does_not_end_gives_nothing(
     assert list(offsets(solid, [], SKIN, list(CLOSED_WAYS)[:2])) == [None, None]
 
 
+def test_a_way_has_more_time_where_others_want_the_processors_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "work", does_not_end)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "_SECONDS_AT_MOST", 0.3)
+    monkeypatch.setattr(gyroid_cad.kernel.offset, "slowed", lambda: 4.0)
+    (solid,) = require_part(wrapped(box())).solids
+    begun = time.monotonic()
+    assert list(offsets(solid, [], SKIN, ["pieces"])) == [None]
+    assert time.monotonic() - begun > 1.2
+
+
 def test_one_way_that_fails_does_not_keep_the_next_from_being_tried() -> None:
     (solid,) = require_part(wrapped(box())).solids
     nothing, core = offsets(solid, [], SKIN, ["no such way", "sharp"])

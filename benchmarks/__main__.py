@@ -25,6 +25,7 @@ from benchmarks import (
     solid_against_sewing,
     solid_against_thickening,
     startup,
+    step_files,
     triangles,
     trimmed,
 )
@@ -43,6 +44,7 @@ BENCHMARKS = (
     real_parts,
     receivers,
     startup,
+    step_files,
     solid_against_thickening,
     solid_against_sewing,
     memory,

@@ -34,8 +34,9 @@ from scipy.spatial.transform import Rotation
 from benchmarks.timing import ROOT, arguments_for, fresh_python, plain_table
 from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.kernel.extent import bounding_box
-from gyroid_cad.kernel.step import read_step, topology_in_step, write_step
+from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.mesh.triangles.distances import SignedDistances
+from gyroid_cad.step.counts import topology_in_step
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.wall.covering import AT_HOME, periodic_offsets
 

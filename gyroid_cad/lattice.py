@@ -14,6 +14,7 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import (
+    BREP,
     TRIANGLE_FORMATS,
     format_of,
     require_assembly_formats,
@@ -34,6 +35,7 @@ from gyroid_cad.wall.parameters import LatticeParameters, MapLike
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import Assembly, AssemblyReport
     from gyroid_cad.builds.solid import Build
+    from gyroid_cad.builds.whole import WholeBuild
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
@@ -172,8 +174,11 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         """
         return {self.surface: self.solid()}
 
-    def report(self, progress: Progress | None = None) -> LatticeReport:
-        """Build the solid if it isn't yet, have the kernel check it too, and say what it is.
+    def report(self, progress: Progress | None = None, kernel_check: bool = False) -> LatticeReport:
+        """Build the solid if it isn't yet, check it, and say what it is.
+
+        Whole patches are checked by the numbers of their edges and their control nets, as :meth:`write` does, unless
+        ``kernel_check`` has the kernel build and check the solid too; one that is trimmed it does in any case.
 
         Examples
         --------
@@ -181,13 +186,14 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> report.valid, report.closed, report.faces
         (True, True, 84)
         """
-        built = self.built(progress)
+        built = self.built(progress) if self.trim or kernel_check else self._whole(progress)
         built.valid(progress)
         with built.timed("fit report"):
             # Of a graded wall that is cut there is no exact volume to compare with.
             known = self.uniform or not self.trim
             exact = self.exact_volume - built.islands.dropped_volume if known else None
-            density = built.density if self.trim else self.volume_fraction
+            block = prod(self.cells) * self.cell_size**3
+            density = built.volume / block if self.trim else self.volume_fraction
             measures = (self.wall_thickness, density, exact)
         return report_of(built, *measures)
 
@@ -199,12 +205,13 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         angle: float = 15.0,
         progress: Progress | None = None,
         instances: bool = False,
+        kernel_check: bool = False,
     ) -> None:
         """Write files; each path's ending chooses STEP (.step, .stp), BREP, STL, 3MF, OBJ or PLY.
 
-        Every path and setting is checked before anything is built. A file appears whole or not at all. STL and 3MF
-        of whole patches are made straight from the NURBS faces: unless STEP or BREP is asked for as well, no solid is
-        built and no kernel loaded. STL is streamed; the others are in memory as a whole while they are written.
+        Every path and setting is checked before anything is built. A file appears whole or not at all. STEP, STL and
+        3MF of whole patches are made straight from the control nets, without the kernel, and checked by the numbers of
+        their edges. STEP and STL are streamed; the others are in memory as a whole while they are written.
 
         Parameters
         ----------
@@ -223,6 +230,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
             Write STEP files as :meth:`assembly`: one cell and its places, not one solid. Hundreds of times smaller
             where there are many cells; to look at, to lay out, to pattern on. Its cells touch and are not fused: for
             whatever needs one body (booleans, meshing, printing) write the solid.
+        kernel_check : bool
+            Have the kernel build and check the solid of STEP files too, as of BREP files and of trimmed lattices.
 
         Raises
         ------
@@ -247,19 +256,16 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         for path in targets:
             if format_of(path) in TRIANGLE_FORMATS:
                 require_near_origin(path, self.fitted(progress).bounding_box(), self.deviation(deviation))
-        if solid:
-            built = self.built(progress)
-            built.write(solid, schema, self.deviation(deviation), angle, progress)
+        by_kernel = solid if kernel_check or self.trim or any(format_of(path) is BREP for path in solid) else []
+        if by_kernel:
+            self.built(progress).write(by_kernel, schema, self.deviation(deviation), angle, progress)
+        elif solid:
+            self._whole(progress).write(solid, schema, progress)
         if flat:
             self.triangles(deviation, progress).write(*flat, progress=progress)
 
     def assembly(self, progress: Progress | None = None) -> Assembly:
         """One cell as a solid and where it stands, as STEP assemblies have it; no solid of all cells is built.
-
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with (stage, done, total).
 
         Raises
         ------
@@ -366,6 +372,11 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         if self.trim:
             made.islands.warn()
         return made
+
+    def _whole(self, progress: Progress | None = None) -> WholeBuild:
+        from gyroid_cad.builds.whole import whole_build
+
+        return whole_build(self.spec(), progress)
 
     def fitted(self, progress: Progress | None = None) -> FittedWall:
         """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked.

@@ -25,7 +25,7 @@ ROWS = [
     ["fields"],
     ["surface"],
     ["wall"],
-    ["trim", "mesh"],
+    ["trim", "mesh", "step"],
     ["kernel"],
     ["builds", "render", "host_shapes"],
     ["lattice"],

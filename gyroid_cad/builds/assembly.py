@@ -19,7 +19,7 @@ from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart, Place, write_assembly
 from gyroid_cad.kernel.solid import faces_by_patch
-from gyroid_cad.kernel.step_products import ShapeSize
+from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.wall.fitted import LatticeSpec
 
 __all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report"]

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from gyroid_cad.common.choices import CheckedBy
 from gyroid_cad.common.tables import Rows, cells_shown, islands_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.surface.fit import fit_patch
 from gyroid_cad.surface.fit_report import fit_report
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.solid import Build
+    from gyroid_cad.builds.whole import WholeBuild
 
 __all__ = ["LatticeReport", "report_of"]
 
@@ -39,13 +41,15 @@ class LatticeReport:
     control_points : int
         Along each side of a patch.
     valid, closed : bool
-        By the kernel's own check; every edge bounds exactly two faces.
+        By the check that was made; every edge bounds exactly two faces.
+    checked_by : {"nets", "kernel"}
+        From the numbers of edges and the control nets, or by the kernel's own check of the solid.
     boundary_edges : int
         Mid-surface edges that bound one patch only: each carries a ruled side wall.
     non_manifold_edges : int
         Lines through the wall in which patches touch without joining.
     volume, volume_exact : float
-        In mm3: enclosed by the kernel's faces, and of the exact wall: by the tube formula, or by quadrature
+        In mm3: enclosed by the faces, and of the exact wall: by the tube formula, or by quadrature
         where the lattice is graded; the latter without what was dropped, and none of a graded lattice that is cut.
     area : float
         In mm2, of all that bounds the solid: both faces, and side walls or flat sides.
@@ -90,6 +94,7 @@ class LatticeReport:
     control_points: int
     valid: bool
     closed: bool
+    checked_by: CheckedBy
     boundary_edges: int
     non_manifold_edges: int
     volume: float
@@ -141,12 +146,12 @@ class LatticeReport:
         )
 
 
-def report_of(built: Build, thickness: float, density: float, volume_exact: float | None) -> LatticeReport:
+def report_of(built: Build | WholeBuild, thickness: float, density: float, volume_exact: float | None) -> LatticeReport:
     """The report on what was built and checked.
 
     Parameters
     ----------
-    built : Build
+    built : Build or WholeBuild
     thickness, density : float
         Of the exact lattice.
     volume_exact : float, optional
@@ -175,6 +180,7 @@ def report_of(built: Build, thickness: float, density: float, volume_exact: floa
         control_points=len(fitted.wall.weights),
         valid=built.valid(),
         closed=built.topology.closed,
+        checked_by=built.checked_by,
         boundary_edges=0 if spec.trimmed else int(complex.free.sum()),
         non_manifold_edges=0 if spec.trimmed else complex.non_manifold_edges,
         volume=built.volume,

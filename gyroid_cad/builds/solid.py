@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.choices import CheckedBy, Schema
 from gyroid_cad.common.formats import BREP, FILE_BYTES_PER_CELL, STEP, STL, format_of
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
@@ -21,10 +21,10 @@ from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import compound_of, enclosed_volume, is_valid, topology
 from gyroid_cad.kernel.solid import KernelShape, another_handle, build_solid
 from gyroid_cad.kernel.step import write_step
-from gyroid_cad.kernel.step_products import ShapeSize
 from gyroid_cad.kernel.stl import closed_triangles, write_meshed_stl
 from gyroid_cad.kernel.trimmed import build_trimmed
 from gyroid_cad.mesh.triangles.writing import write_triangles
+from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
 from gyroid_cad.wall.areas import fitted_areas
@@ -61,6 +61,8 @@ class Build:
     seconds : dict
         By stage.
     """
+
+    checked_by: CheckedBy = "kernel"
 
     def __init__(self, fitted: FittedWall, progress: Progress | None) -> None:
         self.fitted = fitted

@@ -25,12 +25,12 @@ from gyroid_cad.cli.options import (
 )
 from gyroid_cad.cli.print_check import check_by
 from gyroid_cad.common.files import file_sizes
-from gyroid_cad.common.formats import PART_FORMATS, listed_endings
+from gyroid_cad.common.formats import BREP, PART_FORMATS, format_of, listed_endings
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
+    from gyroid_cad.builds.report import LatticeReport
     from gyroid_cad.builds.triangles import TriangleReport
-    from gyroid_cad.lattice import LatticeReport
 
 __all__ = ["build_command"]
 
@@ -46,6 +46,11 @@ __all__ = ["build_command"]
     is_flag=True,
     help="Write .step as an assembly: one cell and its places, named and coloured. Hundreds of times smaller, to look "
     "at and lay out; the cells touch and are not fused. Of cells that are all alike and not trimmed.",
+)
+@click.option(
+    "--kernel-check",
+    is_flag=True,
+    help="Have the kernel build and check the solid of .step too, as of .brep and of trimmed lattices.",
 )
 @deviation_option
 @angle_option
@@ -80,14 +85,14 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
         return
     outputs, printer = given["output"], given["printer"]
     checked = None if printer is None else check_by(printer)
-    settings = {name: given[name] for name in ("schema", "deviation", "angle", "instances")}
+    settings = {name: given[name] for name in ("schema", "deviation", "angle", "instances", "kernel_check")}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
         report: AssemblyReport | LatticeReport | TriangleReport
         if given["instances"]:
             report = lattice.assembly_report(progress)
         elif lattice.needs_solid(outputs):
-            report = lattice.report(progress)
+            report = lattice.report(progress, given["kernel_check"] or any(format_of(path) is BREP for path in outputs))
         else:
             report = lattice.triangle_report(given["deviation"], progress)
         check = None if checked is None else checked(lattice, given["deviation"], progress)

@@ -18,6 +18,7 @@ __all__ = [
     "SCHEMAS",
     "SURFACE_NAMES",
     "TRIMS",
+    "CheckedBy",
     "FitName",
     "Kind",
     "Profile",
@@ -34,6 +35,8 @@ Trim = Literal["box"]
 Route = Literal["brep", "triangles"]
 # Of STEP files.
 Schema = Literal["ap214", "ap242"]
+# Of what is announced as valid: by the numbers of edges and the control nets, or by the kernel.
+CheckedBy = Literal["nets", "kernel"]
 # By whose limits a file is checked.
 Profile = Literal["default", "creo", "nx"]
 # On the command line, where no FitSettings can be given.

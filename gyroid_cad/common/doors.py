@@ -126,6 +126,7 @@ LATTICE = (
     _row("bc length", **_OF_PAPER),
     _row("scale", **_OF_PAPER),
     *_WRITTEN,
+    _row("kernel check", **_but_hosts("a host's shape is the kernel's own")),
     _row("instances", **_but_hosts("the host's assemblies hold one shape at many places")),
     *_ANSWER,
     _row(

@@ -35,11 +35,11 @@ from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelShape, another_handle
-from gyroid_cad.kernel.step_products import ShapeSize
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
+from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands

@@ -24,9 +24,9 @@ from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
-from gyroid_cad.kernel.step import product_name, reading_step, write_parts
-from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart
+from gyroid_cad.kernel.step import reading_step, write_parts
 from gyroid_cad.kernel.step_solids import read_step_bodies
+from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart, product_name
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +32,9 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.compat import NumberedShapes, ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.surfaces import nurbs_of_surface
 from gyroid_cad.nurbs.surface import NurbsSurface, face_integrals
+from gyroid_cad.step.counts import Topology
 
 __all__ = [
-    "Topology",
     "compound_of",
     "enclosed_volume",
     "is_valid",
@@ -54,26 +53,6 @@ Floats = NDArray[np.float64]
 _ABOUT = 1e-2
 # Of volumes and areas, relative, as the kernel estimates it: far above what it comes to.
 _MEASURE = 1e-4
-
-
-@dataclass(frozen=True, slots=True)
-class Topology:
-    """Counts of a shape's parts.
-
-    Attributes
-    ----------
-    solids, faces : int
-    open_edges : int
-        Edges that do not bound exactly two faces, once in each direction.
-    """
-
-    solids: int
-    faces: int
-    open_edges: int
-
-    @property
-    def closed(self) -> bool:
-        return self.solids > 0 and self.open_edges == 0
 
 
 def topology(shape: TopoDS_Shape) -> Topology:

@@ -13,10 +13,11 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.kernel.apart import read_shape
-from gyroid_cad.kernel.check import Topology, is_valid, measure, parts_of, topology
+from gyroid_cad.kernel.check import is_valid, measure, parts_of, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.kernel.stl import diagonal, meshed_by_face
+from gyroid_cad.step.counts import Topology
 
 __all__ = ["Described", "described", "lattice_sides", "read_shape", "shown_triangles"]
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from OCP.BOPTools import BOPTools_AlgoTools3D
 from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+from OCP.GeomAbs import GeomAbs_Plane
 from OCP.gp import gp_Pnt, gp_Pnt2d
 from OCP.IntTools import IntTools_Context
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_FORWARD, TopAbs_IN, TopAbs_Orientation, TopAbs_REVERSED
@@ -128,9 +130,30 @@ def _solids(shells: Sequence[TopoDS_Shell], volume_of: VolumeOf | None) -> list[
         else:
             outer.append(solid)
     # Solids before voids are added: of those round a void, which lie in each other's voids, the smallest is its own.
+    # The kernel's check asks of every void in which of those before it it lies: large ones answer slowly.
+    voids.sort(key=lambda shell: shell.NbChildren())
     for shell, solid in [(shell, _round(shell, outer)) for shell in voids]:
-        builder.Add(solid, shell)
+        builder.Add(solid, _begun_off_planes(shell))
     return outer
+
+
+def _begun_off_planes(shell: TopoDS_Shell) -> TopoDS_Shell:
+    """The closed shell, its first face one whose first edge is of no plane face, if there is one.
+
+    ``BRepCheck_Solid`` asks in which voids a point of the first edge of each lies, by a ray to a void's first face.
+    Voids that a plane skin seals have faces in one plane: from a point there the ray lies in it, and errs.
+    """
+    faces, of_planes = [as_face(face) for face in parts_of(shell, TopAbs_FACE)], NumberedShapes()
+    for face in faces:
+        if BRepAdaptor_Surface(face, False).GetType() == GeomAbs_Plane:
+            for edge in parts_of(face, TopAbs_EDGE):
+                of_planes.Add(edge)
+    first = next((place for place, face in enumerate(faces) if not of_planes.Contains(_first_edge(face))), 0)
+    return _shell([*faces[first:], *faces[:first]])
+
+
+def _first_edge(face: TopoDS_Face) -> TopoDS_Shape:
+    return next(edge for edge in parts_of(face, TopAbs_EDGE) if not BRep_Tool.Degenerated_s(as_edge(edge)))
 
 
 def _holds_infinity(solid: TopoDS_Solid) -> bool:

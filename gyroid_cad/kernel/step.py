@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import os
-import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from threading import RLock
 from types import MappingProxyType
@@ -28,56 +25,34 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.check import Topology, parts_of, topology
+from gyroid_cad.kernel.check import parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import UnknownGeometryError
-from gyroid_cad.kernel.step_products import Occurrence, ShapeSize, StepPart, products_of, time_stamp, write_products
+from gyroid_cad.kernel.step_solids import products_of
+from gyroid_cad.step.counts import Topology, require_counts
+from gyroid_cad.step.products import (
+    Occurrence,
+    ShapeSize,
+    StepPart,
+    product_name,
+    time_stamp,
+    write_products,
+)
 from gyroid_cad.version import __version__
 
 __all__ = [
     "no_messages",
-    "product_name",
     "read_step",
     "reading_step",
-    "topology_in_step",
     "write_parts",
     "write_step",
 ]
 
-# Entities that count, each from its line's beginning: the kernel's writer folds lines, and has blanks.
-_COUNTED = re.compile(
-    rb"\n#\d+\s*=\s*(?:(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|ADVANCED_FACE|FACE_SURFACE)\s*\("
-    rb"|ORIENTED_EDGE\s*\('[^']*',\s*\*,\s*\*,\s*#(\d+))"
-)
-
-
-def topology_in_step(path: str | os.PathLike[str]) -> Topology:
-    """Count the solids, faces and edges that are not used twice in the text of a STEP file, whoever wrote it.
-
-    No kernel is asked, so that what its writer left out is seen. A face is an ``ADVANCED_FACE`` (ISO 10303-511),
-    and an edge is used by each ``ORIENTED_EDGE`` that names it.
-    """
-    with open(path, "rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as text:
-        found = Counter(match.group(1, 2) for match in _COUNTED.finditer(text))
-    kinds = Counter({kind: count for (kind, _), count in found.items() if kind})
-    return Topology(
-        solids=kinds[b"MANIFOLD_SOLID_BREP"] + kinds[b"BREP_WITH_VOIDS"],
-        faces=kinds[b"ADVANCED_FACE"] + kinds[b"FACE_SURFACE"],
-        open_edges=sum(count != 2 for (kind, _), count in found.items() if not kind),
-    )
-
 
 def _require_whole(path: str | os.PathLike[str], written: Path, shape: TopoDS_Shape) -> None:
-    """Refuse a file that does not hold all of a shape, or not as closed."""
-    wanted, found = topology(shape), topology_in_step(written)
-    # Copies of one solid are written once, with the places where they stand.
+    wanted = topology(shape)
     solids, faces = (_counted_once(shape, kind) for kind in (TopAbs_SOLID, TopAbs_FACE))
-    whole = solids <= found.solids <= wanted.solids and faces <= found.faces <= wanted.faces
-    if not whole or found.open_edges > wanted.open_edges:
-        raise ExportError(
-            f"{path} was not written: its text held {found.solids} of {wanted.solids} solids, "
-            f"{found.faces} of {wanted.faces} faces and {found.open_edges} open edges; BREP holds the shape as it is"
-        )
+    require_counts(path, written, wanted, Topology(solids, faces, wanted.open_edges))
 
 
 def _counted_once(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> int:
@@ -186,12 +161,6 @@ def _write_by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], schema: 
             if writer.Write(str(temporary)) != IFSelect_RetDone:
                 raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
         _require_whole(path, temporary, shape)
-
-
-def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
-    """The name, or the file's stem, in characters that ISO 10303-21 takes as they are: the kernel escapes none."""
-    wanted = Path(path).stem if name is None else name
-    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
 
 
 def read_step(path: str | os.PathLike[str]) -> TopoDS_Shape:

@@ -1,9 +1,9 @@
-"""Curves and surfaces of the kernel as the entities that ISO 10303-42 has for them: read into arrays, not yet text."""
+"""Curves and surfaces of the kernel, read into what STEP has for them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,112 +33,20 @@ from OCP.GeomConvert import GeomConvert
 from OCP.gp import gp_Dir, gp_Pnt
 from OCP.TopLoc import TopLoc_Location
 
+from gyroid_cad.step.geometry import AxisPlacement, Geometry, Knots, Line, Placed, Spline, SweptSurface, Triple
+
 __all__ = [
-    "AxisPlacement",
     "Geometries",
-    "Geometry",
-    "Knots",
-    "Line",
-    "Placed",
-    "Spline",
-    "SweptSurface",
-    "Triple",
     "UnknownGeometryError",
     "axis_placement",
     "read_geometry",
 ]
 
 Floats = NDArray[np.float64]
-Triple = tuple[float, float, float]
-# Origin, axis and direction of the first axis.
-AxisPlacement = tuple[Triple, Triple, Triple]
-Knots = tuple[tuple[float, ...], tuple[int, ...]]
 
 
 class UnknownGeometryError(Exception):
     """Something that only the kernel's own writer can put into words: an offset surface, say, or a face of no solid."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Spline:
-    """A B-spline curve or surface.
-
-    Attributes
-    ----------
-    degrees : tuple of int
-        One of a curve, two of a surface.
-    poles : ndarray, shape (n, 3) or (n, m, 3)
-        In mm.
-    weights : ndarray, shape (n,) or (n, m), or None
-        None where it is polynomial.
-    knots : tuple of (values, multiplicities)
-        By parameter.
-    closed : tuple of bool
-        By parameter.
-    """
-
-    degrees: tuple[int, ...]
-    poles: Floats
-    weights: Floats | None
-    knots: tuple[Knots, ...]
-    closed: tuple[bool, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Placed:
-    """A conic, a plane, or a surface that turns about an axis.
-
-    Attributes
-    ----------
-    kind : str
-        Name of the entity.
-    origin, axis, along : tuple of float
-        Of its frame: in mm, and two directions at right angles.
-    sizes : tuple of float
-        Radii in mm and angles in radians, in the entity's order.
-    left_handed : bool
-        Whether the kernel's frame is, so that its normal is the opposite of the entity's.
-    """
-
-    kind: str
-    origin: Triple
-    axis: Triple
-    along: Triple
-    sizes: tuple[float, ...] = ()
-    left_handed: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A straight line.
-
-    Attributes
-    ----------
-    origin, direction : tuple of float
-    """
-
-    origin: Triple
-    direction: Triple
-
-
-@dataclass(frozen=True, slots=True)
-class SweptSurface:
-    """The surface that a curve leaves as it moves along a direction, or turns about an axis.
-
-    Attributes
-    ----------
-    curve : Spline, Placed or Line
-    direction : tuple of float
-    origin : tuple of float, optional
-        Of the axis that it turns about.
-    """
-
-    curve: Spline | Placed | Line
-    direction: Triple
-    origin: Triple | None = None
-
-
-Geometry = Spline | Placed | Line | SweptSurface
 
 
 class Geometries:

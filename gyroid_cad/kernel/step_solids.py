@@ -1,10 +1,9 @@
-"""Solids and shells as STEP has them: the topology walked once, and written with what faces and edges share once."""
+"""Solids and shells of the kernel, read into what STEP has for them: the topology is walked once."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 from OCP.BRep import BRep_Tool
@@ -28,120 +27,14 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, 
 
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid, as_wire
-from gyroid_cad.kernel.step_geometry import Geometries, Placed, Spline, Triple, UnknownGeometryError
-from gyroid_cad.kernel.step_text import StepText, flag, quoted, refs
+from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement
+from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
+from gyroid_cad.step.products import Occurrence, StepPart
 
-__all__ = ["LEAST_GAP", "StepBody", "read_step_bodies", "require_bodies"]
+__all__ = ["products_of", "read_step_bodies", "require_bodies"]
 
-# In mm: the kernel's smallest distance, which no tolerance is below.
-LEAST_GAP = 1e-7
 # Along an edge, from 0 to 1: by the golden ratio, so that they are not where a curve was fitted through points.
 _SAMPLES = np.arange(1, 18) * (np.sqrt(5) - 1) / 2 % 1
-
-# Of an edge: its number, and whether it is run from its first vertex to its last.
-Use = tuple[int, bool]
-
-
-@dataclass(frozen=True, slots=True)
-class _Loop:
-    """A border of a face: uses of edges, one after the other, or a single vertex."""
-
-    uses: list[Use]
-    vertex: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Face:
-    surface: int
-    forward: bool
-    loops: list[_Loop]
-
-
-@dataclass(slots=True)
-class StepBody:
-    """A solid, or a shell that bounds none, read from the kernel.
-
-    Attributes
-    ----------
-    gap : float
-        The largest in mm, of edges from their surfaces and from their ends.
-    surfaces, curves : Geometries
-    vertices : list of tuple of float
-    edges : list of (first vertex, last vertex, curve)
-    shells : list of list of faces
-    outer : int
-        Which of them is not round a void.
-    solid : bool
-    """
-
-    gap: float = 0.0
-    surfaces: Geometries = field(default_factory=Geometries)
-    curves: Geometries = field(default_factory=Geometries)
-    vertices: list[Triple] = field(default_factory=list)
-    edges: list[tuple[int, int, int]] = field(default_factory=list)
-    shells: list[list[_Face]] = field(default_factory=list)
-    outer: int = 0
-    solid: bool = True
-
-    @property
-    def extent(self) -> float:
-        """The largest coordinate of its vertices and splines, in mm."""
-        splines = [one for some in (self.surfaces, self.curves) for one in some.found if isinstance(one, Spline)]
-        places = [np.array(self.vertices), *(one.poles for one in splines)]
-        return max(float(np.abs(some).max()) for some in places)
-
-    def write(self, text: StepText, name: str, face_names: Iterator[str]) -> tuple[int, list[int]]:
-        """Write the body.
-
-        Parameters
-        ----------
-        text : StepText
-        name : str
-        face_names : iterator of str
-            One a face, as the kernel counts them, or none.
-
-        Returns
-        -------
-        body : int
-            Number of its entity.
-        faces : list of int
-            Numbers of its faces, as the kernel counts them.
-        """
-        geometries = text.geometries([*self.surfaces.found, *self.curves.found])
-        curves = geometries[len(self.surfaces.found) :]
-        points = text.points(np.array(self.vertices).reshape(-1, 3), shared=False)
-        vertices = text.add_all(f"VERTEX_POINT('',#{point})" for point in points)
-        edges = text.add_all(
-            f"EDGE_CURVE('',#{vertices[first]},#{vertices[last]},#{curves[curve]},.T.)"
-            for first, last, curve in self.edges
-        )
-        shells, faces = [], []
-        for shell in self.shells:
-            numbers = []
-            for face in shell:
-                bounds = [self._bound(text, loop, vertices, edges, face.forward) for loop in face.loops]
-                surface = self.surfaces.found[face.surface]
-                # The entity's normal is the opposite of the kernel's there.
-                turned = isinstance(surface, Placed) and surface.left_handed
-                rest = f"{refs(bounds)},#{geometries[face.surface]},{flag(face.forward != turned)}"
-                numbers.append(text.add(f"ADVANCED_FACE({quoted(next(face_names, ''))},{rest})"))
-            shells.append(text.add(f"{'CLOSED' if self.solid else 'OPEN'}_SHELL('',{refs(numbers)})"))
-            faces += numbers
-        if not self.solid:
-            return text.add(f"SHELL_BASED_SURFACE_MODEL({quoted(name)},{refs(shells)})"), faces
-        outer = shells.pop(self.outer)
-        if not shells:
-            return text.add(f"MANIFOLD_SOLID_BREP({quoted(name)},#{outer})"), faces
-        voids = text.add_all(f"ORIENTED_CLOSED_SHELL('',*,#{shell},.F.)" for shell in shells)
-        return text.add(f"BREP_WITH_VOIDS({quoted(name)},#{outer},{refs(voids)})"), faces
-
-    def _bound(self, text: StepText, loop: _Loop, vertices: range, edges: range, forward: bool) -> int:
-        if loop.vertex is not None:
-            border = text.add(f"VERTEX_LOOP('',#{vertices[loop.vertex]})")
-        else:
-            uses = text.add_all(f"ORIENTED_EDGE('',*,*,#{edges[edge]},{flag(along)})" for edge, along in loop.uses)
-            border = text.add(f"EDGE_LOOP('',{refs(uses)})")
-        return text.add(f"FACE_BOUND('',#{border},{flag(forward)})")
 
 
 def read_step_bodies(shape: TopoDS_Shape) -> list[StepBody]:
@@ -153,6 +46,32 @@ def read_step_bodies(shape: TopoDS_Shape) -> list[StepBody]:
         If it holds anything that is not known here.
     """
     return [_Reading(body).read for body in parts_of(shape, require_bodies(shape))]
+
+
+def products_of(
+    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = ()
+) -> tuple[list[StepPart], list[Occurrence]]:
+    """Return the parts that a shape is written as, and their places if it has a solid in several.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    name : str
+        Of the product.
+    body_names : sequence of str
+        One a body, as the kernel counts them, or none.
+
+    Raises
+    ------
+    UnknownGeometryError
+    """
+    kinds, bodies = NumberedShapes(), list(parts_of(shape, require_bodies(shape)))
+    which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
+    if len(bodies) == kinds.Extent():
+        return [StepPart(name, read_step_bodies(shape), body_names=body_names)], []
+    parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
+    places = [axis_placement(body.Location()) for body in bodies]
+    return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
 
 
 def require_bodies(shape: TopoDS_Shape) -> TopAbs_ShapeEnum:
@@ -176,6 +95,7 @@ class _Reading:
 
     def __init__(self, body: TopoDS_Shape) -> None:
         self.read = StepBody(solid=body.ShapeType() == TopAbs_SOLID)
+        self._surfaces, self._curves = Geometries(), Geometries()
         self._edges, self._vertices = NumberedShapes(), NumberedShapes()
         self._meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]] = []
         # A solid is what its outer shell holds; that the kernel has it inside out is not for STEP to say.
@@ -190,20 +110,21 @@ class _Reading:
             # The shell of a void is written as seen from the void.
             turned = number != self.read.outer
             self.read.shells.append([self._face(as_face(face), turned) for face in _children(shell)])
+        self.read.surfaces, self.read.curves = self._surfaces.found, self._curves.found
         self.read.gap = _largest_gap(self._meetings)
 
-    def _face(self, face: TopoDS_Face, turned: bool) -> _Face:
+    def _face(self, face: TopoDS_Face, turned: bool) -> StepFace:
         location = TopLoc_Location()
         geometry = BRep_Tool.Surface_s(face, location)
-        surface = self.read.surfaces.number(geometry, location)
+        surface = self._surfaces.number(geometry, location)
         wires = _children(face.Oriented(TopAbs_FORWARD))
         on_ball = isinstance(geometry, Geom_SphericalSurface)
         if not wires:
             raise UnknownGeometryError("a face without a border")
         loops = [loop for wire in wires for loop in self._loops(wire, face, on_ball)]
-        return _Face(surface, (_along(face) != turned), loops)
+        return StepFace(surface, (_along(face) != turned), loops)
 
-    def _loops(self, wire: TopoDS_Shape, face: TopoDS_Face, on_ball: bool) -> list[_Loop]:
+    def _loops(self, wire: TopoDS_Shape, face: TopoDS_Face, on_ball: bool) -> list[StepLoop]:
         if wire.ShapeType() != TopAbs_WIRE:
             raise UnknownGeometryError("a face with more than wires")
         edges = [as_edge(edge) for edge in _children(wire)]
@@ -217,7 +138,7 @@ class _Reading:
             return [self._pole(edges)]
         for some in (uses, uses[::-1]):
             if self._joined(some):
-                return [_Loop(some)]
+                return [StepLoop(some)]
         explorer, ordered = BRepTools_WireExplorer(as_wire(wire), as_face(face.Oriented(TopAbs_FORWARD))), []
         while explorer.More():
             if not BRep_Tool.Degenerated_s(explorer.Current()):
@@ -225,13 +146,13 @@ class _Reading:
             explorer.Next()
         if sorted(ordered) != sorted(uses) or not self._joined(ordered):
             raise UnknownGeometryError("a wire that does not close")
-        return [_Loop(ordered)]
+        return [StepLoop(ordered)]
 
-    def _pole(self, edges: list[TopoDS_Edge]) -> _Loop:
+    def _pole(self, edges: list[TopoDS_Edge]) -> StepLoop:
         pole = next(edge for edge in edges if BRep_Tool.Degenerated_s(edge))
-        return _Loop([], self._vertex(TopExp.FirstVertex_s(pole)))
+        return StepLoop([], self._vertex(TopExp.FirstVertex_s(pole)))
 
-    def _closed_loops(self, uses: list[Use]) -> list[_Loop]:
+    def _closed_loops(self, uses: list[EdgeUse]) -> list[StepLoop]:
         """Join uses end to end."""
         left, loops = list(uses), []
         while left:
@@ -242,27 +163,27 @@ class _Reading:
                     raise UnknownGeometryError("a wire that does not close")
                 left.remove(following)
                 loop.append(following)
-            loops.append(_Loop(loop))
+            loops.append(StepLoop(loop))
         return loops
 
-    def _ends(self, use: Use) -> tuple[int, int]:
+    def _ends(self, use: EdgeUse) -> tuple[int, int]:
         """Vertices where a use of an edge begins and ends."""
         first, last, _ = self.read.edges[use[0]]
         return (first, last) if use[1] else (last, first)
 
-    def _joined(self, uses: list[Use]) -> bool:
+    def _joined(self, uses: list[EdgeUse]) -> bool:
         """Tell whether every edge ends where the next begins."""
         ends = [self._ends(use) for use in uses]
         return all(end == start for (_, end), (start, _) in zip(ends, [*ends[1:], ends[0]], strict=True))
 
-    def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> Use:
+    def _use(self, edge: TopoDS_Edge, face: TopoDS_Face) -> EdgeUse:
         along, known = _along(edge), self._edges.Extent()
         number = int(self._edges.Add(edge))
         self._meet(BRep_Tool.Tolerance_s(edge), edge, face)
         if number > known:
             forward = as_edge(edge.Oriented(TopAbs_FORWARD))
             location = TopLoc_Location()
-            curve = self.read.curves.number(BRep_Tool.Curve_s(forward, location, 0.0, 0.0), location)
+            curve = self._curves.number(BRep_Tool.Curve_s(forward, location, 0.0, 0.0), location)
             ends = TopExp.FirstVertex_s(forward), TopExp.LastVertex_s(forward)
             self.read.edges.append((self._vertex(ends[0]), self._vertex(ends[1]), curve))
             for end in ends:

@@ -20,7 +20,8 @@ from gyroid_cad.common.formats import PART_FORMATS, listed_endings, require_form
 from gyroid_cad.errors import FitError, KernelError, ParameterError
 from gyroid_cad.fields.field import Field
 from gyroid_cad.fields.makers import linear
-from gyroid_cad.kernel.check import Topology, enclosed_volume, topology
+from gyroid_cad.kernel.check import enclosed_volume, topology
+from gyroid_cad.step.counts import Topology
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall import fitted
 from gyroid_cad.wall.fitted import LatticeSpec

@@ -31,7 +31,17 @@ Captured = pytest.CaptureFixture[str]
 KEYS = [
     *("cells", "cell_size", "cells_alike", "thickness", "min_thickness", "max_thickness", "density"),
     *("patches", "faces", "solids", "islands", "islands_volume", "dropped", "dropped_volume"),
-    *("control_points", "valid", "closed", "boundary_edges", "non_manifold_edges", "volume", "volume_exact", "area"),
+    *(
+        "control_points",
+        "valid",
+        "closed",
+        "checked_by",
+        "boundary_edges",
+        "non_manifold_edges",
+        "volume",
+        "volume_exact",
+        "area",
+    ),
     *("max_deviation", "max_wall_error", "max_normal_angle", "samples_per_patch", "seconds", "files"),
 ]
 ONE_CELL = ["--cells", "1", "1", "1", "--cell-size", "10"]
@@ -115,7 +125,7 @@ def test_what_the_program_says_of_its_file_is_true_of_the_file(
 def test_the_json_is_the_lattices_own_report(capsys: Captured, tmp_path: Path) -> None:
     run = in_process(capsys, "build", "-o", tmp_path / "a.brep", *ONE_CELL, "--density", "0.25", *COARSE, "--json")
     summary = json.loads(run.out)
-    report = Lattice((1, 1, 1), 10.0, density=0.25, fit=FitSettings(5)).report().as_dict()
+    report = Lattice((1, 1, 1), 10.0, density=0.25, fit=FitSettings(5)).report(kernel_check=True).as_dict()
     assert run.status == 0
     assert list(summary) == KEYS
     for key in set(KEYS) - {"seconds", "files", "cells"}:

@@ -20,9 +20,10 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape, TopoDS_Shell, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError
-from gyroid_cad.kernel.check import Topology, enclosed_volume, is_valid, measure_about, topology
+from gyroid_cad.kernel.check import enclosed_volume, is_valid, measure_about, topology
 from gyroid_cad.kernel.compat import as_face
 from gyroid_cad.kernel.solid import build_solid
+from gyroid_cad.step.counts import Topology
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.wall.complex import build_complex

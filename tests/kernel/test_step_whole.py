@@ -21,12 +21,13 @@ from OCP.gp import gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.check import Topology, compound_of, topology
-from gyroid_cad.kernel.step import read_step, topology_in_step, write_step
+from gyroid_cad.kernel.check import compound_of, topology
+from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.kernel.surfaces import kernel_curve
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.nurbs.basis import uniform_knots
 from gyroid_cad.nurbs.surface import NurbsCurve
+from gyroid_cad.step.counts import Topology, topology_in_step
 
 PARTS = sorted((Path(__file__).parents[3] / "shared" / "parts").glob("*.step"))
 DRAWN = {

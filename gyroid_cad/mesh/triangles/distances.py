@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import numbered_groups
 from gyroid_cad.errors import GyroidError
 from gyroid_cad.mesh.triangles.spread import spread_points
+from gyroid_cad.wall.distances import tree_of
 
 __all__ = ["SignedDistances", "Windings", "locator_of", "vtk_module"]
 
@@ -127,7 +127,7 @@ class SignedDistances:
         return found
 
     @cached_property
-    def _spread(self) -> tuple[cKDTree, float]:
+    def _spread(self) -> tuple[Any, float]:
         """Points spread over the triangles, and how far any place of those is from the nearest one at most, in mm."""
         vertices, triangles = self._surface
         corners = vertices[triangles]
@@ -136,7 +136,7 @@ class SignedDistances:
         # No place of a triangle is further from one of its corners than the longest of its sides is long.
         wide = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1) > spacing
         points = np.concatenate([vertices, spread_points(corners[wide], spacing)[0]])
-        return cKDTree(points), spacing * (1 + _ROUNDING)
+        return tree_of(points), spacing * (1 + _ROUNDING)
 
     @cached_property
     def _turns(self) -> Windings:

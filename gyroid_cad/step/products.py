@@ -9,19 +9,13 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from OCP.TopAbs import TopAbs_FORWARD
-from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Shape
-
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.kernel.check import parts_of
-from gyroid_cad.kernel.compat import NumberedShapes
-from gyroid_cad.kernel.step_geometry import AxisPlacement, axis_placement
-from gyroid_cad.kernel.step_solids import LEAST_GAP, StepBody, read_step_bodies, require_bodies
-from gyroid_cad.kernel.step_text import StepText, quoted, real, refs
+from gyroid_cad.step.bodies import LEAST_GAP, WritableBody
+from gyroid_cad.step.geometry import AxisPlacement
+from gyroid_cad.step.text import StepText, quoted, real, refs
 from gyroid_cad.version import __version__
 
-__all__ = ["Occurrence", "ShapeSize", "StepPart", "products_of", "time_stamp", "write_products"]
+__all__ = ["Occurrence", "ShapeSize", "StepPart", "product_name", "time_stamp", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -68,7 +62,7 @@ class StepPart:
     Attributes
     ----------
     name : str
-    bodies : sequence of StepBody
+    bodies : sequence of WritableBody
     colour : str
         By which STEP knows it; that of the file's reader if left out.
     body_names : sequence of str
@@ -79,7 +73,7 @@ class StepPart:
     """
 
     name: str
-    bodies: Sequence[StepBody]
+    bodies: Sequence[WritableBody]
     colour: str = ""
     body_names: Sequence[str] = ()
     face_names: Sequence[str] = ()
@@ -126,40 +120,20 @@ def write_products(
         Of all of it, for receivers to compare what they find with.
     """
     extent = max(body.extent for part in parts for body in part.bodies)
-    with path.open("w", encoding="ascii", newline="\n") as out:
-        out.write(_header(name, schema))
+    with path.open("wb") as out:
+        out.write(_header(name, schema).encode("ascii"))
         text = StepText(out, extent)
         products = _Products(text, schema)
         whole = products.assembly(name, parts, occurrences) if occurrences else products.part(parts[0], name)
         if size is not None:
             products.validate(whole, size)
-        out.write("ENDSEC;\nEND-ISO-10303-21;\n")
+        out.write(b"ENDSEC;\nEND-ISO-10303-21;\n")
 
 
-def products_of(
-    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = ()
-) -> tuple[list[StepPart], list[Occurrence]]:
-    """Return the parts that a shape is written as, and their places if it has a solid in several.
-
-    Parameters
-    ----------
-    shape : TopoDS_Shape
-    name : str
-        Of the product.
-    body_names : sequence of str
-        One a body, as the kernel counts them, or none.
-
-    Raises
-    ------
-    UnknownGeometryError
-    """
-    kinds, bodies = NumberedShapes(), list(parts_of(shape, require_bodies(shape)))
-    which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
-    if len(bodies) == kinds.Extent():
-        return [StepPart(name, read_step_bodies(shape), body_names=body_names)], []
-    parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
-    places = [axis_placement(body.Location()) for body in bodies]
-    return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
+def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
+    """The name, or the file's stem, in characters that ISO 10303-21 takes as they are: the kernel escapes none."""
+    wanted = Path(path).stem if name is None else name
+    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
 
 
 def time_stamp() -> str:
@@ -293,9 +267,11 @@ class _Products:
             others = ((face, colour) for face, colour in zip(faces, colours, strict=False) if colour != part.colour)
             styled += [
                 of_solid,
-                *self.text.add_all(
-                    f"OVER_RIDING_STYLED_ITEM('overriding color',(#{self._style(colour)}),#{face},#{of_solid})"
-                    for face, colour in others
+                *(
+                    self.text.add(
+                        f"OVER_RIDING_STYLED_ITEM('overriding color',(#{self._style(one)}),#{face},#{of_solid})"
+                    )
+                    for face, one in others
                 ),
             ]
         self.text.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',{refs(styled)},#{context})")

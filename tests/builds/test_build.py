@@ -148,7 +148,7 @@ def test_the_memory_that_files_take_is_asked_for_before_anything_is_built(monkey
     monkeypatch.setattr(psutil, "virtual_memory", lambda: enough_to_build)
     memory.require_memory(CELLS, 1_500_000)
     with pytest.raises(ParameterError, match="GB"):
-        require_settings(CELLS, "ap214", 0.01, 15.0)
+        require_settings(CELLS, 0.01, 15.0)
 
 
 @pytest.mark.usefixtures("forgotten")
@@ -233,7 +233,7 @@ def test_a_file_may_be_named_once_only_also_through_a_link_or_a_detour(tmp_path:
 
 
 def test_settings_of_files_are_checked_with_no_file_in_sight() -> None:
-    require_settings([], "ap242", 0.1, 15.0)
-    for bad in (("ap203", 0.1, 15.0), ("ap214", 0.0, 15.0), ("ap214", 0.1, 90.0)):
+    require_settings([], 0.1, 15.0)
+    for bad in ((0.0, 15.0), (0.1, 90.0)):
         with pytest.raises(ParameterError):
             require_settings([], *bad)

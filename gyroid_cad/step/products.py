@@ -183,9 +183,7 @@ class _Products:
         """Make a body something that has properties of its own, as the practice does."""
         add = self.text.add
         aspect = add(f"SHAPE_ASPECT('','',#{product.shape},.F.)")
-        defined = add(f"PROPERTY_DEFINITION('shape with specific properties','properties for subshape',#{aspect})")
-        representation = add(f"SHAPE_REPRESENTATION('',(#{body}),#{product.context})")
-        add(f"SHAPE_DEFINITION_REPRESENTATION(#{defined},#{representation})")
+        add(f"GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#{aspect},#{product.representation},#{body})")
         return aspect
 
     def validate(self, shape: int, context: int, size: ShapeSize) -> None:

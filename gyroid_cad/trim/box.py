@@ -231,9 +231,8 @@ class _Assembly:
         areas = self.areas + [cap.area for cap in caps]
         if capped:
             self._require_no_gap(caps, sum(areas))
-        count = int(component.max()) + 1 if len(component) else 0
         moments = self.moments + [cap.moments(levels[cap.plane]) for cap in caps]
-        totals = np.zeros((count, 5))
+        totals = np.zeros((int(component.max(initial=-1)) + 1, 5))
         np.add.at(totals, component, np.column_stack([fluxes, areas, np.reshape(moments, (-1, 3))]))
         centroids = self.middle + totals[:, 2:] / (totals[:, :1] if capped else 1.0)
         points = [point @ self.box.axes.T for point in self.points]

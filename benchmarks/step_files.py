@@ -18,12 +18,12 @@ from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 from OCP.TopoDS import TopoDS_Shape
 
 from benchmarks.timing import Row, arguments_for, best_in_turn, print_verdicts, seconds_of_process
-from gyroid_cad.common.sizes import ShapeSize
 from gyroid_cad.kernel.step import no_messages
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.step.counts import topology_in_step
 from gyroid_cad.step.products import StepPart, write_products
 from gyroid_cad.step.walls import wall_bodies
+from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["main"]

@@ -15,12 +15,12 @@ from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import STEP, require_formats
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress
-from gyroid_cad.common.sizes import joint_size
 from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown, wall_shown
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart, Place, write_assembly
 from gyroid_cad.kernel.solid import faces_by_patch
 from gyroid_cad.step.header import StepHeader
+from gyroid_cad.wall.areas import joint_size
 from gyroid_cad.wall.fitted import LatticeSpec
 
 __all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report"]

@@ -16,7 +16,6 @@ from gyroid_cad.common.choices import CheckedBy
 from gyroid_cad.common.formats import BREP, FILE_BYTES_PER_CELL, STEP, STL, format_of
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
-from gyroid_cad.common.sizes import ShapeSize, joint_size
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.brep import write_brep
 from gyroid_cad.kernel.check import compound_of, enclosed_volume, is_valid, topology
@@ -28,7 +27,7 @@ from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.step.header import StepHeader
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
-from gyroid_cad.wall.areas import piece_sizes
+from gyroid_cad.wall.areas import ShapeSize, joint_size, piece_sizes
 from gyroid_cad.wall.covering import PERTURBATIONS, first_success
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 

@@ -13,7 +13,6 @@ from gyroid_cad.common.choices import CheckedBy
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.common.sizes import ShapeSize, joint_size
 from gyroid_cad.errors import FitError
 from gyroid_cad.step.bodies import LEAST_GAP
 from gyroid_cad.step.counts import Topology, require_counts
@@ -21,7 +20,7 @@ from gyroid_cad.step.header import StepHeader, product_name
 from gyroid_cad.step.products import StepPart, write_products
 from gyroid_cad.step.walls import WallBody, wall_bodies
 from gyroid_cad.trim.islands import Islands
-from gyroid_cad.wall.areas import piece_sizes
+from gyroid_cad.wall.areas import ShapeSize, joint_size, piece_sizes
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 from gyroid_cad.wall.offset import SIDES

@@ -11,7 +11,6 @@ from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
 from gyroid_cad.common.progress import Progress, timed
-from gyroid_cad.common.sizes import ShapeSize
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.report import FillReport
 from gyroid_cad.host_shapes import HostShapes
@@ -22,6 +21,7 @@ from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.step.header import StepHeader
+from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["Filled"]
 

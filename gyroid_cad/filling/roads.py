@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
-from gyroid_cad.common.sizes import ShapeSize
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
@@ -33,6 +32,7 @@ from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.crossing import cross_part
 from gyroid_cad.trim.measures import PieceMeasures, boundary_measures, joined, lattice_measures, whole_measures
+from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
 __all__ = ["Job", "Made", "Road", "taken"]

@@ -20,7 +20,6 @@ from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.sizes import ShapeSize, joint_size
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
@@ -28,6 +27,7 @@ from gyroid_cad.kernel.step import reading_step, write_parts
 from gyroid_cad.kernel.step_solids import read_step_bodies
 from gyroid_cad.step.header import StepHeader, product_name
 from gyroid_cad.step.products import Occurrence, StepPart
+from gyroid_cad.wall.areas import ShapeSize, joint_size
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 

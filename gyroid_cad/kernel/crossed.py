@@ -15,7 +15,6 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Vertex, TopoDS_Wire
 
-from gyroid_cad.common.sizes import ShapeSize
 from gyroid_cad.kernel.boundary import ReadBoundary
 from gyroid_cad.kernel.check import measure_about, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
@@ -33,6 +32,7 @@ from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.sections import section_knots
+from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["FaceSizes", "crossed_pieces"]

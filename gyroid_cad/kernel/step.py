@@ -23,7 +23,6 @@ from OCP.TopoDS import TopoDS_Shape
 
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
-from gyroid_cad.common.sizes import ShapeSize, joint_size
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
@@ -33,6 +32,7 @@ from gyroid_cad.step.counts import Topology, require_counts
 from gyroid_cad.step.header import DESCRIPTION, PROGRAM, StepHeader, product_name, time_stamp
 from gyroid_cad.step.products import Occurrence, StepPart, write_products
 from gyroid_cad.step.text import escaped
+from gyroid_cad.wall.areas import ShapeSize, joint_size
 
 __all__ = [
     "no_messages",

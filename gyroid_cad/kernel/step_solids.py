@@ -25,12 +25,12 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, TopoDS_Vertex
 
-from gyroid_cad.common.sizes import ShapeSize
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid, as_wire
 from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement
 from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
 from gyroid_cad.step.products import Occurrence, StepPart
+from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["products_of", "read_step_bodies", "require_bodies"]
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.sizes import ShapeSize
 from gyroid_cad.step.bodies import LEAST_GAP, WritableBody
 from gyroid_cad.step.geometry import AxisPlacement
 from gyroid_cad.step.header import StepHeader, header_section
 from gyroid_cad.step.text import StepText, quoted, real, refs
+from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["Occurrence", "StepPart", "write_products"]
 

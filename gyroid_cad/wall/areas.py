@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.sizes import ShapeSize
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.quadrature import shifted_integrals
 from gyroid_cad.nurbs.surface import face_integrals, grid_derivatives
@@ -16,7 +17,7 @@ from gyroid_cad.wall.exact import differentiation_matrix, grid_rates, offset_pat
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import SIDES, Wall
 
-__all__ = ["WallAreas", "distinct_patches", "exact_areas", "fitted_areas", "piece_sizes"]
+__all__ = ["ShapeSize", "WallAreas", "distinct_patches", "exact_areas", "fitted_areas", "joint_size", "piece_sizes"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -26,6 +27,39 @@ Integers = NDArray[np.int64]
 _EXACT_POINTS, _ACROSS_POINTS = 16, 4
 # So few that what is computed for them stays in the processor's cache.
 _NETS_AT_ONCE = 64
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSize:
+    """Size of a shape, by quadrature.
+
+    Attributes
+    ----------
+    volume, area : float
+        In mm3 and mm2, of all its bodies; shells have no volume.
+    centroid : tuple of float, optional
+        Of the volume, in mm; none where it is not known as exactly.
+    """
+
+    volume: float
+    area: float
+    centroid: Point | None = None
+
+
+def joint_size(sizes: Sequence[ShapeSize]) -> ShapeSize:
+    """Size of several shapes together; its centroid is known if all of theirs are.
+
+    Examples
+    --------
+    >>> joint_size([ShapeSize(1.0, 6.0, (0.5, 0.5, 0.5)), ShapeSize(3.0, 9.0, (2.5, 0.5, 0.5))])
+    ShapeSize(volume=4.0, area=15.0, centroid=(2.0, 0.5, 0.5))
+    """
+    volume, area = sum(size.volume for size in sizes), sum(size.area for size in sizes)
+    known = [(size.volume, size.centroid) for size in sizes if size.centroid is not None]
+    if not volume or len(known) < len(sizes):
+        return ShapeSize(volume, area)
+    x, y, z = (sum(share * centroid[axis] for share, centroid in known) / volume for axis in range(3))
+    return ShapeSize(volume, area, (x, y, z))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,11 @@ from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_SOLID
 
-from gyroid_cad.common.sizes import ShapeSize, joint_size
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.wall.areas import fitted_areas, piece_sizes
+from gyroid_cad.wall.areas import ShapeSize, fitted_areas, joint_size, piece_sizes
 
 COARSE = FitSettings(5)
 TURNED = {"origin": (5000.0, -3.0, 7.0), "rotation": (10.0, 20.0, 30.0)}

@@ -15,7 +15,6 @@ from OCP.TopAbs import TopAbs_SOLID
 from OCP.XCAFDoc import XCAFDoc_Area, XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool, XCAFDoc_Volume
 
 from gyroid_cad.common.formats import SCHEMAS
-from gyroid_cad.common.sizes import ShapeSize, joint_size
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.kernel.assembly import new_document, read_bodies
 from gyroid_cad.kernel.check import parts_of
@@ -23,6 +22,7 @@ from gyroid_cad.kernel.compat import LabelSequence
 from gyroid_cad.kernel.step import write_step
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.wall.areas import ShapeSize, joint_size
 
 COARSE = FitSettings(5)
 

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
         SelfIntersectionError,
     )
     from gyroid_cad.fields.field import Field
-    from gyroid_cad.filling.fill import Filled, fill
+    from gyroid_cad.filling.fill import fill
+    from gyroid_cad.filling.filled import Filled
     from gyroid_cad.filling.report import FillReport
     from gyroid_cad.filling.triangles import FilledTriangles
     from gyroid_cad.lattice import Lattice, LatticeReport
@@ -84,7 +85,8 @@ _HOMES = {
         "SelfIntersectionError",
     ),
     "fields.field": ("Field",),
-    "filling.fill": ("Filled", "fill"),
+    "filling.fill": ("fill",),
+    "filling.filled": ("Filled",),
     "filling.report": ("FillReport",),
     "filling.triangles": ("FilledTriangles",),
     "lattice": ("Lattice", "LatticeReport"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import prod
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,7 @@ from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
+from gyroid_cad.step.header import StepHeader
 from gyroid_cad.wall.fitted import FittedWall, fitted_wall
 from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.parameters import LatticeParameters, MapLike
@@ -39,8 +40,6 @@ if TYPE_CHECKING:
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
-
-_LENGTH = "a length in mm, a finite number"
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +205,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         progress: Progress | None = None,
         instances: bool = False,
         kernel_check: bool = False,
+        author: str = "",
+        organisation: str = "",
     ) -> None:
         """Write files; each path's ending chooses STEP (.step, .stp), BREP, STL, 3MF, OBJ or PLY.
 
@@ -217,6 +218,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         ----------
         *paths : path-like
         schema : {"ap214", "ap242"}
+        author, organisation : str
             Of STEP files.
         deviation : float, optional
             Of the triangles in STL and 3MF from the faces, in mm; if left out, a thousandth of the cell size, or a
@@ -227,9 +229,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         progress : callable, optional
             Called with (stage, done, total).
         instances : bool
-            Write STEP files as :meth:`assembly`: one cell and its places, not one solid. Hundreds of times smaller
-            where there are many cells; to look at, to lay out, to pattern on. Its cells touch and are not fused: for
-            whatever needs one body (booleans, meshing, printing) write the solid.
+            Write STEP files as :meth:`assembly`: one cell and its places, hundreds of times smaller; to look at, to
+            lay out, to pattern on. Its cells touch and are not fused: for booleans, meshing, printing write the solid.
         kernel_check : bool
             Have the kernel build and check the solid of STEP files too, as of BREP files and of trimmed lattices.
 
@@ -242,25 +243,25 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
         >>> lattice.write("cell.step", "cell.stl", deviation=0.1)
         """
-        targets = require_formats(paths)
+        targets, header = require_formats(paths), StepHeader(schema, author, organisation)
         if deviation is not None:
-            deviation = finite_number("deviation", deviation, _LENGTH)
+            deviation = finite_number("deviation", deviation, "a length in mm, a finite number")
         if instances:
             require_assembly_formats(targets)
-            require_settings((1, 1, 1), schema, deviation, angle)
-            self.assembly(progress).write(*targets, schema=schema, progress=progress)
+            require_settings((1, 1, 1), deviation, angle)
+            self.assembly(progress).write(*targets, **asdict(header), progress=progress)
             return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
-        require_settings(self.cells, schema, deviation, angle, solid=bool(solid))
+        require_settings(self.cells, deviation, angle, solid=bool(solid))
         for path in targets:
             if format_of(path) in TRIANGLE_FORMATS:
                 require_near_origin(path, self.fitted(progress).bounding_box(), self.deviation(deviation))
         by_kernel = solid if kernel_check or self.trim or any(format_of(path) is BREP for path in solid) else []
         if by_kernel:
-            self.built(progress).write(by_kernel, schema, self.deviation(deviation), angle, progress)
+            self.built(progress).write(by_kernel, header, self.deviation(deviation), angle, progress)
         elif solid:
-            self._whole(progress).write(solid, schema, progress)
+            self._whole(progress).write(solid, header, progress)
         if flat:
             self.triangles(deviation, progress).write(*flat, progress=progress)
 
@@ -353,8 +354,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
             ]
         if drawn:
             low, high = self.bounding_box()
-            extent = " x ".join(f"{b - a:.5g}" for a, b in zip(low, high, strict=True))
-            rows.append(("extent", f"{extent} mm"))
+            rows.append(("extent", " x ".join(f"{b - a:.5g}" for a, b in zip(low, high, strict=True)) + " mm"))
         return rows
 
     def built(self, progress: Progress | None = None) -> Build:

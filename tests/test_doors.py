@@ -32,7 +32,7 @@ from gyroid_cad import FitError, IslandsWarning, Lattice, fill
 from gyroid_cad.cli.app import commands, main
 from gyroid_cad.common.doors import DOORS, FILL, LATTICE, Absent
 from gyroid_cad.filling import fill as filling
-from gyroid_cad.filling.fill import Filled
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.kernel import apart
 from gyroid_cad.kernel.brep import read_brep, write_brep
 from gyroid_cad.kernel.check import compound_of, parts_of
@@ -153,6 +153,10 @@ USUAL: dict[str, Given] = {
 PAPER = ("cell size", "thickness", "density")
 
 
+def header(made: Made) -> str:
+    return made.file.read_text(encoding="ascii").split("ENDSEC;")[0]
+
+
 def corners_are_poles(text: str) -> bool:
     """Whether vertices stand on points that are control points too: so only what no kernel made is written."""
     corners = set(re.findall(r"=VERTEX_POINT\('',(#\d+)\)", text))
@@ -162,6 +166,13 @@ def corners_are_poles(text: str) -> bool:
 WRITTEN = {
     "file": Case({"file": "made.brep"}, lambda made, usual: read_brep(made.file).ShapeType() is not None),
     "schema": Case({"file": "made.step", "schema": "ap242"}, lambda made, usual: b"AP242" in made.file.read_bytes()),
+    "author": Case(
+        {"file": "made.step", "author": "Zoë O'Neill"},
+        lambda made, usual: "('Zo\\X2\\00EB\\X0\\ O''Neill')" in header(made),
+    ),
+    "organisation": Case(
+        {"file": "made.step", "organisation": "A \\ B"}, lambda made, usual: "('A \\\\ B')" in header(made)
+    ),
     "deviation": Case({"file": "made.stl", "deviation": 0.2}, sized),
     "angle": Case({"file": "made.stl", "deviation": 0.5, "angle": 80}, sized),
     "check": Case(

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from gyroid_cad.errors import MissingHostError, host_import
-from gyroid_cad.filling.fill import Filled, fill
+from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.extent import bounding_box
 from gyroid_cad.lattice import Lattice

@@ -19,6 +19,7 @@ from gyroid_cad.common.tables import Rows, cells_shown, text_table, volume_shown
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart, Place, write_assembly
 from gyroid_cad.kernel.solid import faces_by_patch
+from gyroid_cad.step.header import StepHeader
 from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.wall.fitted import LatticeSpec
 
@@ -76,7 +77,14 @@ class Assembly:
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
         return NamedPart(solid, PART_NAME, GREEN, faces, ShapeSize(self.cell.volume, self.cell.area()))
 
-    def write(self, *paths: str | os.PathLike[str], schema: Schema = "ap214", progress: Progress | None = None) -> None:
+    def write(
+        self,
+        *paths: str | os.PathLike[str],
+        schema: Schema = "ap214",
+        progress: Progress | None = None,
+        author: str = "",
+        organisation: str = "",
+    ) -> None:
         """Write STEP assemblies. A file appears whole or not at all.
 
         Parameters
@@ -86,6 +94,8 @@ class Assembly:
         schema : {"ap214", "ap242"}
         progress : callable, optional
             Called with (stage, done, total).
+        author, organisation : str
+            For the files' headers.
 
         Raises
         ------
@@ -96,14 +106,14 @@ class Assembly:
         ExportError
         """
 
-        targets = require_formats(paths, [STEP])
+        targets, header = require_formats(paths, [STEP]), StepHeader(schema, author, organisation)
         require_memory(self.cells, _BYTES_PER_INSTANCE)
         if not self.cell.valid(progress):
             raise KernelError("the kernel finds the solid of one cell invalid; nothing was written")
         part = self.part()
         for path in targets:
             with self.cell.timed(f"write {path.name}", progress):
-                write_assembly(part, self.places(), path, schema)
+                write_assembly(part, self.places(), path, header)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.choices import CheckedBy, Schema
+from gyroid_cad.common.choices import CheckedBy
 from gyroid_cad.common.formats import BREP, FILE_BYTES_PER_CELL, STEP, STL, format_of
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, report_progress, timed
@@ -24,6 +24,7 @@ from gyroid_cad.kernel.step import write_step
 from gyroid_cad.kernel.stl import closed_triangles, write_meshed_stl
 from gyroid_cad.kernel.trimmed import build_trimmed
 from gyroid_cad.mesh.triangles.writing import write_triangles
+from gyroid_cad.step.header import StepHeader
 from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
@@ -150,7 +151,12 @@ class Build:
         return self._valid
 
     def write(
-        self, targets: Sequence[Path], schema: Schema, deviation: float, angle: float, progress: Progress | None = None
+        self,
+        targets: Sequence[Path],
+        header: StepHeader,
+        deviation: float,
+        angle: float,
+        progress: Progress | None = None,
     ) -> None:
         """Write the solid to each target in the format of its ending.
 
@@ -165,7 +171,7 @@ class Build:
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                write_shape(self._shape, ShapeSize(self.volume, self.area()), path, schema, deviation, angle)
+                write_shape(self._shape, ShapeSize(self.volume, self.area()), path, header, deviation, angle)
 
     def _require_memory(self, bytes_per_cell: int) -> None:
         require_memory(self.cells, bytes_per_cell, len(self.fitted.wall.weights))
@@ -187,7 +193,7 @@ def write_shape(
     shape: KernelShape,
     size: ShapeSize,
     path: Path,
-    schema: Schema,
+    header: StepHeader,
     deviation: float,
     angle: float,
     names: Sequence[str] = (),
@@ -201,7 +207,7 @@ def write_shape(
 
     form = format_of(path)
     if form is STEP:
-        write_step(shape, path, schema, size=size, body_names=names)
+        write_step(shape, path, header, size=size, body_names=names)
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:

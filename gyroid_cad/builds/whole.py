@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.choices import CheckedBy, Schema
+from gyroid_cad.common.choices import CheckedBy
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import FitError
 from gyroid_cad.step.bodies import LEAST_GAP
 from gyroid_cad.step.counts import Topology, require_counts
-from gyroid_cad.step.products import ShapeSize, StepPart, product_name, write_products
+from gyroid_cad.step.header import StepHeader, product_name
+from gyroid_cad.step.products import ShapeSize, StepPart, write_products
 from gyroid_cad.step.walls import WallBody, wall_bodies
 from gyroid_cad.trim.islands import Islands
 from gyroid_cad.wall.areas import fitted_areas, volume_by_flux
@@ -88,7 +89,7 @@ class WholeBuild:
         """Tell whether it is sound; what is not is refused before."""
         return self.topology.closed
 
-    def write(self, targets: Sequence[Path], schema: Schema, progress: Progress | None = None) -> None:
+    def write(self, targets: Sequence[Path], header: StepHeader, progress: Progress | None = None) -> None:
         """Write the solid to STEP files.
 
         Raises
@@ -99,7 +100,7 @@ class WholeBuild:
         for path in targets:
             with self.timed(f"write {path.name}", progress), replacing(path) as temporary:
                 name = product_name(path)
-                write_products(temporary, name, [StepPart(name, self.bodies)], schema=schema, size=size)
+                write_products(temporary, name, [StepPart(name, self.bodies)], header=header, size=size)
                 require_counts(path, temporary, self.topology, self.topology)
 
     def _require_sound(self, volume: float) -> None:

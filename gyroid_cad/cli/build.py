@@ -14,7 +14,9 @@ from gyroid_cad.cli.check import checked_files, print_made
 from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options, printed_options
 from gyroid_cad.cli.options import (
+    HEADER_KEYS,
     angle_option,
+    author_options,
     check_option,
     deviation_option,
     json_option,
@@ -41,6 +43,7 @@ __all__ = ["build_command"]
 )
 @lattice_options
 @schema_option
+@author_options
 @click.option(
     "--instances",
     is_flag=True,
@@ -85,7 +88,7 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
         return
     outputs, printer = given["output"], given["printer"]
     checked = None if printer is None else check_by(printer)
-    settings = {name: given[name] for name in ("schema", "deviation", "angle", "instances", "kernel_check")}
+    settings = {name: given[name] for name in (*HEADER_KEYS, "deviation", "angle", "instances", "kernel_check")}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
         report: AssemblyReport | LatticeReport | TriangleReport

@@ -139,7 +139,7 @@ def printed_config(values: Mapping[str, Any]) -> str:
     given = {
         key: list(value) if isinstance(value, tuple) else _number_or_text(value)
         for key, value in values.items()
-        if value is not None and value != () and value is not False
+        if value is not None and value not in ((), "") and value is not False
     }
     return tomli_w.dumps(given)
 

@@ -24,7 +24,9 @@ from gyroid_cad.cli.lattice_options import (
     take_defaults,
 )
 from gyroid_cad.cli.options import (
+    HEADER_KEYS,
     angle_option,
+    author_options,
     check_option,
     deviation_option,
     file_paths,
@@ -48,6 +50,7 @@ from gyroid_cad.common.formats import (
 )
 from gyroid_cad.common.memory import require_libraries
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.step.header import StepHeader
 
 __all__ = ["fill_command"]
 
@@ -137,6 +140,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @click.option("--repair", is_flag=True, help="Close a part of triangles that is open, and say what was done.")
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
+@author_options
 @deviation_option
 @angle_option
 @check_option
@@ -182,8 +186,10 @@ def fill_command(
         return
     for read in filter(None, (part, given["core"])):
         _require_another_file(read, output)
-    written = {name: given[name] for name in ("schema", "deviation", "angle")}
-    require_settings((1, 1, 1), **written)
+    header, limits = ({name: given[name] for name in names} for names in (HEADER_KEYS, ("deviation", "angle")))
+    StepHeader(**header)
+    require_settings((1, 1, 1), **limits)
+    written = {**header, **limits}
     checked = None if printer is None else check_by(printer)
     settings["route"] = _route(part, given, output)
     if settings["route"] == TRIANGLES:

@@ -12,7 +12,9 @@ from gyroid_cad.common.choices import SCHEMAS
 from gyroid_cad.version import __version__
 
 __all__ = [
+    "HEADER_KEYS",
     "angle_option",
+    "author_options",
     "check_option",
     "deviation_option",
     "file_paths",
@@ -25,6 +27,8 @@ __all__ = [
     "version_option",
 ]
 
+# Of the headers of STEP files.
+HEADER_KEYS = ("schema", "author", "organisation")
 Declared = TypeVar("Declared", bound=Callable[..., object])
 
 
@@ -74,6 +78,17 @@ def output_option(endings: str, required: bool = False) -> Decorator:
 schema_option = click.option(
     "--schema", type=click.Choice(SCHEMAS), default="ap214", show_default=True, help="Of STEP files."
 )
+
+
+def author_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of by whom a STEP file is."""
+    for name in reversed(HEADER_KEYS[1:]):
+        function = click.option(f"--{name}", metavar="NAME", default="", help="For the headers of STEP files.")(
+            function
+        )
+    return function
+
+
 deviation_option = click.option(
     "--deviation",
     type=float,

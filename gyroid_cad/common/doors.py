@@ -100,6 +100,8 @@ _WALL = (
 _WRITTEN = (
     _row("file", "--output", python="paths", **_WRITING),
     _row("schema", **_WRITING),
+    _row("author", **_WRITING),
+    _row("organisation", **_WRITING),
     _row("deviation", **_WRITING),
     _row("angle", **_WRITING),
 )

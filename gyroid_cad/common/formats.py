@@ -238,15 +238,12 @@ def require_meshing(deviation: float, angle: float = DEFAULT_ANGLE) -> None:
         raise ParameterError("angle", angle, f"{SMALLEST_ANGLE:g} or more and below 90 degrees")
 
 
-def require_settings(
-    cells: tuple[int, int, int], schema: Schema, deviation: float | None, angle: float, solid: bool = True
-) -> None:
+def require_settings(cells: tuple[int, int, int], deviation: float | None, angle: float, solid: bool = True) -> None:
     """Check the settings of files to be written, and that memory will do, before anything is built.
 
     Parameters
     ----------
     cells : tuple of int
-    schema : str
     deviation : float, optional
     angle : float
     solid : bool
@@ -256,7 +253,6 @@ def require_settings(
     ------
     ParameterError
     """
-    require_schema(schema)
     require_meshing(1.0 if deviation is None else deviation, angle)
     if solid:
         require_memory(cells, FILE_BYTES_PER_CELL)

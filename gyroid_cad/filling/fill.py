@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import Kind, Route, Schema, SurfaceName
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
-from gyroid_cad.common.progress import Progress, named_progress, report_progress, timed
+from gyroid_cad.common.choices import Kind, Route, SurfaceName
+from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
 from gyroid_cad.filling.distance_skin import Shell
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
 from gyroid_cad.filling.forecast import require_cover
 from gyroid_cad.filling.infill import described_infill
@@ -28,150 +25,20 @@ from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovere
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
-from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
-from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
 from gyroid_cad.kernel.skin import hollow as hollowed
-from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.lattice import Lattice
-from gyroid_cad.mesh.triangles.stl import require_near_origin
-from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
-from gyroid_cad.render.picture import CAMERA, SIZE, require_view
-from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.parameters import valid_tolerance
 
-__all__ = ["Filled", "fill"]
+__all__ = ["fill"]
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Filled(HostShapes):
-    """A filled part.
-
-    Attributes
-    ----------
-    domains : dict
-        Shape by name: "sheet", "network-a", "network-b", "surface", or "channel-a" and "channel-b".
-    report : FillReport
-
-    Examples
-    --------
-    >>> import cadquery as cq
-    >>> from gyroid_cad import FitSettings, fill
-    >>> block = cq.Workplane().box(4, 4, 4, centered=False)
-    >>> filled = fill(block, cell_size=8, density=0.3, fit=FitSettings(5))
-    >>> list(filled.domains), filled.report.valid
-    (['sheet'], True)
-    """
-
-    domains: dict[str, KernelShape]
-    report: FillReport
-
-    def solid(self) -> KernelShape:
-        """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own.
-
-        Examples
-        --------
-        >>> import cadquery as cq
-        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
-        >>> filled.solid().ShapeType()
-        <TopAbs_ShapeEnum.TopAbs_SOLID: 2>
-        """
-
-        shapes = list(self.domains.values())
-        return another_handle(shapes[0]) if len(shapes) == 1 else compound_of(shapes)
-
-    def named_solids(self) -> dict[str, KernelShape]:
-        """Shapes by the names of their domains, each under a handle of the caller's own.
-
-        Examples
-        --------
-        >>> import cadquery as cq
-        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
-        >>> list(filled.named_solids())
-        ['sheet']
-        """
-        return {name: another_handle(shape) for name, shape in self.domains.items()}
-
-    def picture(self, size: tuple[int, int] = SIZE, camera: Point = CAMERA) -> bytes:
-        """The filled part drawn, as a PNG file, as :meth:`gyroid_cad.Lattice.picture` draws a lattice.
-
-        Raises
-        ------
-        ParameterError, ExportError
-
-        Examples
-        --------
-        >>> import cadquery as cq
-        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
-        >>> filled.picture(size=(120, 100))[1:4]
-        b'PNG'
-        """
-        return shape_picture(self.solid(), *require_view(size, camera))
-
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> MimeBundle:
-        return mime_bundle("filled part", self.report.rows, self.picture)
-
-    def __str__(self) -> str:
-        return str(self.report)
-
-    def deviation(self, given: float | None = None) -> float:
-        """Return the largest distance of triangles from the faces, in mm: the usual one if none is given.
-
-        Raises
-        ------
-        ParameterError
-
-        Examples
-        --------
-        >>> import cadquery as cq
-        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
-        >>> filled.deviation(), filled.deviation(0.1)
-        (0.008, 0.1)
-        """
-        usual = min(self.report.cell_size / 1000, (self.report.thickness or self.report.cell_size) / 10)
-        limit = usual if given is None else finite_number("deviation", given)
-        require_meshing(limit)
-        return limit
-
-    def write(
-        self,
-        *paths: str | os.PathLike[str],
-        schema: Schema = "ap214",
-        deviation: float | None = None,
-        angle: float = 15.0,
-        progress: Progress | None = None,
-    ) -> None:
-        """Write the filled part, as :meth:`gyroid_cad.Lattice.write` does a lattice.
-
-        Raises
-        ------
-        ParameterError, ExportError
-
-        Examples
-        --------
-        >>> import cadquery as cq
-        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
-        >>> filled.write("light.step", "light.stl", deviation=0.1)
-        """
-        targets, limit = require_formats(paths), self.deviation(deviation)
-        require_settings((1, 1, 1), schema, limit, angle)
-        for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
-            if not self.report.closed:
-                raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
-            require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
-        size = ShapeSize(self.report.volume, self.report.area)
-        names = [name for name, shape in self.domains.items() for _ in range(topology(shape).solids)]
-        for path in targets:
-            with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), size, path, schema, limit, angle, names)
 
 
 def fill(

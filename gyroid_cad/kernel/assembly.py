@@ -19,14 +19,13 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
-from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
 from gyroid_cad.kernel.step import reading_step, write_parts
 from gyroid_cad.kernel.step_solids import read_step_bodies
-from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart, product_name
+from gyroid_cad.step.header import StepHeader, product_name
+from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 
@@ -79,7 +78,7 @@ def write_assembly(
     part: NamedPart,
     places: Iterable[Place],
     path: str | os.PathLike[str],
-    schema: Schema = "ap214",
+    header: StepHeader,
     name: str | None = None,
 ) -> None:
     """Write a part once, and where it is to be found, in millimetres.
@@ -91,23 +90,22 @@ def write_assembly(
         Name and translation in mm of each of its occurrences.
     path : path-like
         Written under a temporary name and moved into place.
-    schema : {"ap214", "ap242"}
+    header : StepHeader
     name : str, optional
         Of the assembly; the file's stem if left out.
 
     Raises
     ------
-    ParameterError, ExportError
+    ExportError
     """
     product = product_name(path, name)
-    require_schema(schema)
     names, colours = [named.name for named in part.faces], [named.colour for named in part.faces]
     written = StepPart(
         part.name, read_step_bodies(part.shape), part.colour, face_names=names, face_colours=colours, size=part.size
     )
     occurrences = [Occurrence(0, called, (place, *_AXES)) for called, place in places]
     whole = ShapeSize(len(occurrences) * part.size.volume, len(occurrences) * part.size.area)
-    write_parts(part.shape, path, schema, product, [written], occurrences, whole)
+    write_parts(part.shape, path, header, product, [written], occurrences, whole)
 
 
 def new_document() -> TDocStd_Document:

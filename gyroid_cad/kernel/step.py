@@ -21,7 +21,6 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_ShapeEnum, TopAbs_SOL
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.common.choices import Schema
 from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.errors import ExportError
@@ -30,15 +29,9 @@ from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.step_geometry import UnknownGeometryError
 from gyroid_cad.kernel.step_solids import products_of
 from gyroid_cad.step.counts import Topology, require_counts
-from gyroid_cad.step.products import (
-    Occurrence,
-    ShapeSize,
-    StepPart,
-    product_name,
-    time_stamp,
-    write_products,
-)
-from gyroid_cad.version import __version__
+from gyroid_cad.step.header import DESCRIPTION, PROGRAM, StepHeader, product_name, time_stamp
+from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart, write_products
+from gyroid_cad.step.text import escaped
 
 __all__ = [
     "no_messages",
@@ -65,12 +58,13 @@ def _counted_once(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> int:
 
 # A host that wrote a file in inches leaves the kernel taking all lengths of shapes for inches.
 _OF_LENGTHS: Mapping[str, str | int] = MappingProxyType({"xstep.cascade.unit": "MM"})
+_PLAIN = StepHeader()
 
 
 def write_step(
     shape: TopoDS_Shape,
     path: str | os.PathLike[str],
-    schema: Schema = "ap214",
+    header: StepHeader = _PLAIN,
     name: str | None = None,
     size: ShapeSize | None = None,
     body_names: Sequence[str] = (),
@@ -87,7 +81,7 @@ def write_step(
     shape : TopoDS_Shape
     path : path-like
         Written under a temporary name and moved into place.
-    schema : {"ap214", "ap242"}
+    header : StepHeader
     name : str, optional
         Of the product; the file's stem if left out.
     size : ShapeSize, optional
@@ -97,21 +91,21 @@ def write_step(
 
     Raises
     ------
-    ParameterError, ExportError
+    ExportError
     """
-    product, kernel_schema = product_name(path, name), require_schema(schema)
+    product = product_name(path, name)
     try:
         parts, places = products_of(shape, product, body_names)
     except UnknownGeometryError:
-        _write_by_kernel(shape, path, kernel_schema, product)
+        _write_by_kernel(shape, path, header, escaped(product))
     else:
-        write_parts(shape, path, schema, product, parts, places, size)
+        write_parts(shape, path, header, product, parts, places, size)
 
 
 def write_parts(
     shape: TopoDS_Shape,
     path: str | os.PathLike[str],
-    schema: Schema,
+    header: StepHeader,
     product: str,
     parts: Sequence[StepPart],
     places: Sequence[Occurrence] = (),
@@ -124,7 +118,7 @@ def write_parts(
     shape : TopoDS_Shape
     path : path-like
         Written under a temporary name and moved into place.
-    schema : {"ap214", "ap242"}
+    header : StepHeader
     product : str
         Name of the whole.
     parts : sequence of StepPart
@@ -138,14 +132,14 @@ def write_parts(
     ExportError
     """
     with replacing(path) as temporary:
-        write_products(temporary, product, parts, places, schema, size)
+        write_products(temporary, product, parts, places, header, size)
         _require_whole(path, temporary, shape)
 
 
-def _write_by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], schema: str, product: str) -> None:
+def _write_by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], header: StepHeader, product: str) -> None:
     """Write with the kernel's own writer, whose settings are global to the process, and count as it makes its model."""
     settings: dict[str, str | int] = {
-        "write.step.schema": schema,
+        "write.step.schema": require_schema(header.schema),
         "write.step.unit": "MM",
         **_OF_LENGTHS,
         "write.step.product.name": product,
@@ -156,7 +150,7 @@ def _write_by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], schema: 
             writer = STEPControl_Writer()
             if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:
                 raise ExportError(f"{path} was not written: the kernel could not translate the shape to STEP")
-            _fill_header(writer, product)
+            _fill_header(writer, product, header)
             _name_product(writer, product)
             if writer.Write(str(temporary)) != IFSelect_RetDone:
                 raise ExportError(f"{path} was not written: the kernel's STEP writer failed")
@@ -191,15 +185,15 @@ def reading_step() -> Iterator[None]:
         yield
 
 
-def _fill_header(writer: STEPControl_Writer, product: str) -> None:
+def _fill_header(writer: STEPControl_Writer, product: str, given: StepHeader) -> None:
     """Say what the file is, by whom, and of when."""
     header = APIHeaderSection_MakeHeader(writer.Model())
     text = TCollection_HAsciiString
     header.SetName(text(product))
-    header.SetAuthorValue(1, text(""))
-    header.SetOrganizationValue(1, text(""))
-    header.SetDescriptionValue(1, text("gyroid lattice"))
-    header.SetOriginatingSystem(text(f"gyroid_cad {__version__}"))
+    header.SetAuthorValue(1, text(escaped(given.author)))
+    header.SetOrganizationValue(1, text(escaped(given.organisation)))
+    header.SetDescriptionValue(1, text(DESCRIPTION))
+    header.SetOriginatingSystem(text(PROGRAM))
     header.SetAuthorisation(text(""))
     header.SetTimeStamp(text(time_stamp()))
 

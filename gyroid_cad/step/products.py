@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.step.bodies import LEAST_GAP, WritableBody
 from gyroid_cad.step.geometry import AxisPlacement
+from gyroid_cad.step.header import StepHeader, header_section
 from gyroid_cad.step.text import StepText, quoted, real, refs
-from gyroid_cad.version import __version__
 
-__all__ = ["Occurrence", "ShapeSize", "StepPart", "product_name", "time_stamp", "write_products"]
+__all__ = ["Occurrence", "ShapeSize", "StepPart", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -34,6 +32,7 @@ _SCHEMAS: Mapping[Schema, tuple[str, str, int, str]] = {
     ),
 }
 _LINES = 0.1
+_PLAIN = StepHeader()
 # Of a property that receivers compare with what they find (recommended practices of the CAx Implementor Forum for
 # geometric validation properties): its name, that of its item, its measure, and the power of the millimetre.
 _VALIDATED = (("volume", "volume measure", "VOLUME", 3), ("surface area", "surface area measure", "AREA", 2))
@@ -102,7 +101,7 @@ def write_products(
     name: str,
     parts: Sequence[StepPart],
     occurrences: Sequence[Occurrence] = (),
-    schema: Schema = "ap214",
+    header: StepHeader = _PLAIN,
     size: ShapeSize | None = None,
 ) -> None:
     """Write a file of parts.
@@ -115,41 +114,19 @@ def write_products(
     parts : sequence of StepPart
         One, if there are no occurrences.
     occurrences : sequence of Occurrence
-    schema : {"ap214", "ap242"}
+    header : StepHeader
     size : ShapeSize, optional
         Of all of it, for receivers to compare what they find with.
     """
     extent = max(body.extent for part in parts for body in part.bodies)
     with path.open("wb") as out:
-        out.write(_header(name, schema).encode("ascii"))
+        out.write((header_section(name, header, _SCHEMAS[header.schema][0]) + "DATA;\n").encode("ascii"))
         text = StepText(out, extent)
-        products = _Products(text, schema)
+        products = _Products(text, header.schema)
         whole = products.assembly(name, parts, occurrences) if occurrences else products.part(parts[0], name)
         if size is not None:
             products.validate(whole, size)
         out.write(b"ENDSEC;\nEND-ISO-10303-21;\n")
-
-
-def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
-    """The name, or the file's stem, in characters that ISO 10303-21 takes as they are: the kernel escapes none."""
-    wanted = Path(path).stem if name is None else name
-    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in wanted)
-
-
-def time_stamp() -> str:
-    """The time that a file bears: now, or that of ``SOURCE_DATE_EPOCH``, the convention for reproducible builds."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = datetime.fromtimestamp(int(epoch), UTC) if epoch.isdigit() else datetime.now()
-    return moment.strftime("%Y-%m-%dT%H:%M:%S")
-
-
-def _header(name: str, schema: Schema) -> str:
-    program = f"gyroid_cad {__version__}"
-    return (
-        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('gyroid lattice'),'2;1');\n"
-        f"FILE_NAME({quoted(name)},'{time_stamp()}',(''),(''),'{program}','{program}','');\n"
-        f"FILE_SCHEMA(('{_SCHEMAS[schema][0]}'));\nENDSEC;\nDATA;\n"
-    )
 
 
 @dataclass(slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, BinaryIO
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad.step.digits import decimal_text, integer_text, joined_rows, text_rows
 from gyroid_cad.step.geometry import Geometry, Knots, Line, Placed, Spline, SweptSurface, Triple
 
-__all__ = ["StepText", "flag", "quoted", "real", "refs", "step_knots"]
+__all__ = ["StepText", "escaped", "flag", "quoted", "real", "refs", "step_knots"]
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -30,6 +31,8 @@ _MOST_DIGITS = 15
 _DIRECTION_DECIMALS = 15
 # Of the steps of knots, relative: rounding only.
 _EVEN = 1e-12
+# Characters that no string may hold as they are.
+_OTHERS = re.compile(r"[^\x20-\x7e]+")
 # Bytes of text that are made at once, about.
 _BLOCK = 2_000_000
 
@@ -224,8 +227,26 @@ def quoted(text: str) -> str:
     --------
     >>> print(quoted("Schoen's surface"))
     'Schoen''s surface'
+    >>> print(quoted("Müller"))
+    'M\\X2\\00FC\\X0\\ller'
     """
-    return "'" + text.replace("\\", "\\\\").replace("'", "''") + "'"
+    return "'" + escaped(text.replace("\\", "\\\\").replace("'", "''")) + "'"
+
+
+def escaped(text: str) -> str:
+    """Text in the characters that a file has (ISO 10303-21, 6.4.3): others by their numbers, in runs.
+
+    Examples
+    --------
+    >>> print(escaped("Löß"))
+    L\\X2\\00F600DF\\X0\\
+    """
+    return _OTHERS.sub(lambda run: _numbered(run.group()), text)
+
+
+def _numbered(run: str) -> str:
+    wide = len(run.encode("utf-16-be")) > 2 * len(run)
+    return f"\\X{4 if wide else 2}\\{run.encode('utf-32-be' if wide else 'utf-16-be').hex().upper()}\\X0\\"
 
 
 def refs(numbers: Iterable[int]) -> str:

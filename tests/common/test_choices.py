@@ -14,7 +14,8 @@ from gyroid_cad.common.choices import FITS, KINDS, SCHEMAS, SURFACE_NAMES, TRIMS
 from gyroid_cad.common.formats import require_schema
 from gyroid_cad.cq_plugin import gyroid, gyroid_fill
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.filling.fill import Filled, fill
+from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.wanted import regions_of
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import SURFACES, USUAL

@@ -12,7 +12,8 @@ import pytest
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
 
 from gyroid_cad.errors import IslandsWarning, ParameterError, PartWarning
-from gyroid_cad.filling.fill import Filled, fill
+from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.part import bodies_of
 from gyroid_cad.surface.fit import FitSettings
 

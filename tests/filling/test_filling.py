@@ -18,7 +18,8 @@ import gyroid_cad.filling.part
 import gyroid_cad.filling.roads
 import gyroid_cad.kernel.regions
 from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError, SealedVoidsWarning
-from gyroid_cad.filling.fill import Filled, fill
+from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.part import part_of
 from gyroid_cad.filling.roads import Made
 from gyroid_cad.filling.wanted import KINDS

@@ -15,7 +15,8 @@ import trimesh
 import gyroid_cad.filling.part
 import gyroid_cad.filling.roads
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.filling.fill import Filled, fill
+from gyroid_cad.filling.fill import fill
+from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.infill import block_infill
 from gyroid_cad.filling.part import part_of
 from gyroid_cad.kernel.check import is_valid, measure, topology

@@ -14,6 +14,7 @@ from gyroid_cad.kernel.check import is_valid
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.kernel.stl import write_meshed_stl
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.step.header import StepHeader
 from gyroid_cad.surface.fit import FitSettings
 
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on Windows")
@@ -67,9 +68,9 @@ def test_threads_write_one_file_at_once_and_each_its_own_schema(tmp_path: Path) 
 
     def write(k: int) -> None:
         try:
-            schema = ("ap214", "ap242")[k % 2]
-            write_step(shapes[k % 2], tmp_path / f"own{k}.step", schema)
-            write_step(shapes[k % 2], tmp_path / "same.step", schema)
+            header = StepHeader(("ap214", "ap242")[k % 2])
+            write_step(shapes[k % 2], tmp_path / f"own{k}.step", header)
+            write_step(shapes[k % 2], tmp_path / "same.step", header)
         except BaseException as problem:
             problems.append(problem)
 

@@ -23,6 +23,7 @@ from gyroid_cad.kernel.part import measure
 from gyroid_cad.kernel.solid import TOLERANCE, build_solid
 from gyroid_cad.kernel.step import read_step, write_step
 from gyroid_cad.lattice import Lattice
+from gyroid_cad.step.header import StepHeader
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
@@ -131,7 +132,7 @@ def test_the_file_lists_every_face_and_edge_once_and_no_curve_in_the_parameter_p
 
 @pytest.mark.parametrize("schema", SCHEMAS)
 def test_every_entity_referred_to_is_in_the_file(solid: TopoDS_Shape, tmp_path: Path, schema: str) -> None:
-    write_step(solid, tmp_path / "part.step", schema)
+    write_step(solid, tmp_path / "part.step", StepHeader(schema))
     assert not dangling_references(tmp_path / "part.step")
 
 
@@ -209,8 +210,8 @@ def test_the_schema_is_the_one_asked_for_whatever_was_written_before(
     solid: TopoDS_Shape, tmp_path: Path, schema: str, protocol: str
 ) -> None:
     for before in SCHEMAS:
-        write_step(solid, tmp_path / "part.step", before)
-        write_step(solid, tmp_path / "part.step", schema)
+        write_step(solid, tmp_path / "part.step", StepHeader(before))
+        write_step(solid, tmp_path / "part.step", StepHeader(schema))
         assert protocol in header(tmp_path / "part.step").split("FILE_SCHEMA")[1]
     assert enclosed_volume(read_step(tmp_path / "part.step")) == pytest.approx(enclosed_volume(solid), rel=1e-8)
 
@@ -230,7 +231,7 @@ def test_pieces_come_back_as_solids_of_their_own(tmp_path: Path) -> None:
 def test_settings_of_others_are_left_as_they_were_and_leave_no_mark_on_the_file(
     solid: TopoDS_Shape, tmp_path: Path, foreign_settings: dict[str, str | int]
 ) -> None:
-    write_step(solid, tmp_path / "part.step", "ap242")
+    write_step(solid, tmp_path / "part.step", StepHeader("ap242"))
     assert _settings() == foreign_settings
     assert "10303 442 " in header(tmp_path / "part.step")
     assert in_millimetres(tmp_path / "part.step")
@@ -268,7 +269,7 @@ def test_a_disk_that_fills_up_leaves_the_older_file_and_nothing_else(
 
 def test_an_unknown_schema_is_refused_before_anything_is_touched(solid: TopoDS_Shape, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"schema = 'ap203': expected ap214 or ap242"):
-        write_step(solid, tmp_path / "part.step", "ap203")
+        write_step(solid, tmp_path / "part.step", StepHeader("ap203"))
     assert not list(tmp_path.iterdir())
     assert {require_schema(schema) for schema in SCHEMAS} == {"AP214IS", "AP242DIS"}
 

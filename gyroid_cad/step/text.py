@@ -301,7 +301,8 @@ def _listed(numbers: Iterable[int]) -> str:
 @lru_cache(maxsize=256)
 def _knots(knots: tuple[Knots, ...]) -> str:
     multiplicities = [f"({_listed(counts)})" for _, counts in knots]
-    values = [_nested(_counted(list(some))) for some, _ in knots]
+    # By the square from -1 to 1 a lattice's faces are known again in a file.
+    values = [_nested(_counted(list(some)) if len(knots) == 1 else list(some)) for some, _ in knots]
     return ",".join([*multiplicities, *values, ".UNSPECIFIED."])
 
 

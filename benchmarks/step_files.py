@@ -21,8 +21,9 @@ from benchmarks.timing import Row, arguments_for, best_in_turn, print_verdicts, 
 from gyroid_cad.kernel.step import no_messages
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.step.counts import topology_in_step
-from gyroid_cad.step.products import ShapeSize, StepPart, write_products
+from gyroid_cad.step.products import StepPart, write_products
 from gyroid_cad.step.walls import wall_bodies
+from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.offset import Wall
 
 __all__ = ["main"]
@@ -60,7 +61,7 @@ def main(arguments: Sequence[str] = ()) -> bool:
 
 
 def _write(wall: Wall, path: Path) -> None:
-    write_products(path, path.stem, [StepPart(path.stem, wall_bodies(wall))], size=ShapeSize(1.0, 1.0))
+    write_products(path, path.stem, [StepPart(path.stem, wall_bodies(wall))], size=ShapeSize(1.0, 1.0, (0.0, 0.0, 0.0)))
 
 
 def _write_by_kernel(solid: TopoDS_Shape, path: Path) -> None:

@@ -20,7 +20,7 @@ from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.kernel.assembly import GREEN, RED, YELLOW, NamedFace, NamedPart, Place, write_assembly
 from gyroid_cad.kernel.solid import faces_by_patch
 from gyroid_cad.step.header import StepHeader
-from gyroid_cad.step.products import ShapeSize
+from gyroid_cad.wall.areas import joint_size
 from gyroid_cad.wall.fitted import LatticeSpec
 
 __all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report"]
@@ -75,7 +75,7 @@ class Assembly:
             name = f"BC_{group + 1}_SFP_{bounding_cell[:patch].count(group) + 1}"
             kinds = ["side_0", "side_1", *(f"edge_{k + 1}" for k in np.flatnonzero(free[patch]))]
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
-        return NamedPart(solid, PART_NAME, GREEN, faces, ShapeSize(self.cell.volume, self.cell.area()))
+        return NamedPart(solid, PART_NAME, GREEN, faces, joint_size(self.cell.sizes))
 
     def write(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
+from functools import cached_property, partial
 from math import prod
 from pathlib import Path
 
@@ -25,10 +25,9 @@ from gyroid_cad.kernel.stl import closed_triangles, write_meshed_stl
 from gyroid_cad.kernel.trimmed import build_trimmed
 from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.step.header import StepHeader
-from gyroid_cad.step.products import ShapeSize
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
-from gyroid_cad.wall.areas import fitted_areas
+from gyroid_cad.wall.areas import ShapeSize, joint_size, piece_sizes
 from gyroid_cad.wall.covering import PERTURBATIONS, first_success
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 
@@ -71,7 +70,7 @@ class Build:
         self._valid: bool | None = None
         self.shift = (0.0, 0.0, 0.0)
         self.islands = Islands()
-        self._cut_area = 0.0
+        self._cut: list[ShapeSize] = []
         self._require_memory(_SOLID_BYTES_PER_CELL)
         wall = fitted.wall
         if fitted.spec.trimmed:
@@ -114,7 +113,9 @@ class Build:
         volumes = left.volumes.tolist()
         kept = kept_pieces(volumes, sum(volumes) / prod(self.cells), island_rule(spec.keep_islands))
         self.islands = islands_of(volumes, kept)
-        self._cut_area = float(left.areas[kept].sum())
+        measures = zip(left.volumes.tolist(), left.areas.tolist(), map(tuple, left.centroids.tolist()), strict=True)
+        sizes = [ShapeSize(*measured) for measured in measures]
+        self._cut = [sizes[piece] for piece in kept]
         self.shift = (float(shift[0]), float(shift[1]), float(shift[2]))
         shape = solids[kept[0]] if len(kept) == 1 else compound_of(solids[piece] for piece in kept)
         of_faces = left.component[: len(left.faces)].tolist()
@@ -136,7 +137,12 @@ class Build:
 
     def area(self) -> float:
         """Area in mm2 of all that bounds the solid, by quadrature of the nets and of what was cut of them."""
-        return self._cut_area if self.fitted.spec.trimmed else fitted_areas(self.fitted.wall).total
+        return joint_size(self.sizes).area
+
+    @cached_property
+    def sizes(self) -> list[ShapeSize]:
+        """Of each of its solids, as the kernel counts them, by quadrature of the nets and of what was cut of them."""
+        return self._cut if self.fitted.spec.trimmed else piece_sizes(self.fitted.wall)
 
     def solid(self) -> KernelShape:
         """A shape of the caller's own, to move as they like, that shares the geometry."""
@@ -171,7 +177,7 @@ class Build:
             raise KernelError(f"the kernel finds its solid of {self.cells} cells invalid; nothing was written")
         for path in targets:
             with self.timed(f"write {path.name}", progress):
-                write_shape(self._shape, ShapeSize(self.volume, self.area()), path, header, deviation, angle)
+                write_shape(self._shape, self.sizes, path, header, deviation, angle)
 
     def _require_memory(self, bytes_per_cell: int) -> None:
         require_memory(self.cells, bytes_per_cell, len(self.fitted.wall.weights))
@@ -191,14 +197,14 @@ class Build:
 
 def write_shape(
     shape: KernelShape,
-    size: ShapeSize,
+    sizes: Sequence[ShapeSize],
     path: Path,
     header: StepHeader,
     deviation: float,
     angle: float,
     names: Sequence[str] = (),
 ) -> None:
-    """Write a shape, whose size is known, and what its solids are called, in the format of the path's ending.
+    """Write a shape, whose solids' sizes are known, and what they are called, in the format of the path's ending.
 
     Raises
     ------
@@ -207,7 +213,7 @@ def write_shape(
 
     form = format_of(path)
     if form is STEP:
-        write_step(shape, path, header, size=size, body_names=names)
+        write_step(shape, path, header, sizes=sizes, body_names=names)
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +17,10 @@ from gyroid_cad.errors import FitError
 from gyroid_cad.step.bodies import LEAST_GAP
 from gyroid_cad.step.counts import Topology, require_counts
 from gyroid_cad.step.header import StepHeader, product_name
-from gyroid_cad.step.products import ShapeSize, StepPart, write_products
+from gyroid_cad.step.products import StepPart, write_products
 from gyroid_cad.step.walls import WallBody, wall_bodies
 from gyroid_cad.trim.islands import Islands
-from gyroid_cad.wall.areas import fitted_areas, volume_by_flux
+from gyroid_cad.wall.areas import ShapeSize, joint_size, piece_sizes
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.fitted import FittedWall, LatticeSpec, fitted_wall
 from gyroid_cad.wall.offset import SIDES
@@ -45,6 +44,8 @@ class WholeBuild:
     volume : float
         In mm3, that the faces enclose.
     bodies : list of WallBody
+    sizes : list of ShapeSize
+        One a body.
     islands : Islands
         None: nothing is cut.
     seconds : dict
@@ -60,7 +61,8 @@ class WholeBuild:
             self.bodies: list[WallBody] = wall_bodies(wall)
             faces = len(SIDES) * complex.patch_count + int(complex.free.sum())
             self.topology = Topology(len(self.bodies), faces, _open_edges(complex))
-            self.volume = volume_by_flux(wall)
+            self.sizes: list[ShapeSize] = piece_sizes(wall)
+            self.volume = joint_size(self.sizes).volume
             self._require_sound(wall.volume())
 
     @property
@@ -77,13 +79,9 @@ class WholeBuild:
         with timed(self.seconds, stage, progress):
             yield
 
-    @cached_property
-    def _area(self) -> float:
-        return fitted_areas(self.fitted.wall).total
-
     def area(self) -> float:
         """Area in mm2 of all that bounds the solid."""
-        return self._area
+        return joint_size(self.sizes).area
 
     def valid(self, progress: Progress | None = None) -> bool:
         """Tell whether it is sound; what is not is refused before."""
@@ -96,11 +94,12 @@ class WholeBuild:
         ------
         ExportError
         """
-        size = ShapeSize(self.volume, self.area())
+        size = joint_size(self.sizes)
         for path in targets:
             with self.timed(f"write {path.name}", progress), replacing(path) as temporary:
                 name = product_name(path)
-                write_products(temporary, name, [StepPart(name, self.bodies)], header=header, size=size)
+                part = StepPart(name, self.bodies, body_sizes=self.sizes)
+                write_products(temporary, name, [part], header=header, size=size)
                 require_counts(path, temporary, self.topology, self.topology)
 
     def _require_sound(self, volume: float) -> None:

@@ -208,10 +208,12 @@ def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
     """Bodies that were filled each by itself, as one."""
     report = joint_report([one.report for one in filled], remarks)
     if len(filled) == 1:
-        return Filled(filled[0].domains, report)
+        return Filled(filled[0].domains, report, filled[0].sizes)
     names = dict.fromkeys(name for one in filled for name in one.domains)
     return Filled(
-        {name: compound_of(one.domains[name] for one in filled if name in one.domains) for name in names}, report
+        {name: compound_of(one.domains[name] for one in filled if name in one.domains) for name in names},
+        report,
+        {name: tuple(size for one in filled for size in one.sizes.get(name, ())) for name in names},
     )
 
 
@@ -263,4 +265,4 @@ def _reported(
         cells_alike=outcome.infill.grading.cells_alike,
         uncovered=outcome.infill.uncovered,
     )
-    return Filled(shapes, report)
+    return Filled(shapes, report, {name: tuple(made.size for made in some) for name, some in domains.items()})

@@ -21,7 +21,7 @@ from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.step.header import StepHeader
-from gyroid_cad.step.products import ShapeSize
+from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["Filled"]
 
@@ -35,6 +35,8 @@ class Filled(HostShapes):
     domains : dict
         Shape by name: "sheet", "network-a", "network-b", "surface", or "channel-a" and "channel-b".
     report : FillReport
+    sizes : dict
+        Volume, area and, where it is known as exactly, centroid of each solid, by the name of its domain.
 
     Examples
     --------
@@ -48,6 +50,7 @@ class Filled(HostShapes):
 
     domains: dict[str, KernelShape]
     report: FillReport
+    sizes: dict[str, tuple[ShapeSize, ...]]
 
     def solid(self) -> KernelShape:
         """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own.
@@ -150,8 +153,8 @@ class Filled(HostShapes):
             if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
-        size = ShapeSize(self.report.volume, self.report.area)
+        sizes = [size for name in self.domains for size in self.sizes[name]]
         names = [name for name, shape in self.domains.items() for _ in range(topology(shape).solids)]
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), size, path, header, limit, angle, names)
+                write_shape(self.solid(), sizes, path, header, limit, angle, names)

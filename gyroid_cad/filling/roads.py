@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
@@ -31,6 +32,7 @@ from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.crossing import cross_part
 from gyroid_cad.trim.measures import PieceMeasures, boundary_measures, joined, lattice_measures, whole_measures
+from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
 __all__ = ["Job", "Made", "Road", "taken"]
@@ -44,11 +46,19 @@ Found = tuple[dict[str, list["Made"]], int, int]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """A solid, or a shell of the bare surface, with its volume in mm3 and its area in mm2."""
+    """A solid, or a shell of the bare surface, with its volume in mm3, its area in mm2, and its centroid in mm.
+
+    There is no centroid where the kernel measured some of it, which is not as exact.
+    """
 
     shape: KernelShape
     volume: float
     area: float
+    centroid: Point | None = None
+
+    @property
+    def size(self) -> ShapeSize:
+        return ShapeSize(self.volume, self.area, self.centroid)
 
 
 class Job(Protocol):
@@ -111,8 +121,10 @@ def _by_sections(job: Job, infill: Infill) -> Found:
         with job.timed("solid"):
             shapes = build_trimmed(left)
         pieces = [
-            Made(shape, 0.0 if region.surface else float(volume), float(area))
-            for shape, volume, area in zip(shapes, left.volumes, left.areas, strict=True)
+            Made(shape, 0.0, area) if region.surface else Made(shape, volume, area, centroid)
+            for shape, volume, area, centroid in zip(
+                shapes, left.volumes.tolist(), left.areas.tolist(), map(tuple, left.centroids.tolist()), strict=True
+            )
         ]
         made[region.name] = [_less(job.part, pieces)] if skinned else pieces
         counted = _patches_of(left)
@@ -180,9 +192,12 @@ def _crossed(
         with job.timed("measure"):
             sizes = FaceSizes([*pieces.inside, *pieces.boundary, *faces], measures(), middle)
     with job.timed("join"):
-        shapes = _joined(job, infill, region, pieces, faces, lambda shell: sizes.of(shell)[0])
-        made = [(shape, *sizes.of(shape)) for shape in shapes]
-    return [Made(shape, 0.0 if region.surface else volume, area) for shape, volume, area in made]
+        shapes = _joined(job, infill, region, pieces, faces, lambda shell: sizes.of(shell).volume)
+        made = [(shape, sizes.of(shape)) for shape in shapes]
+    return [
+        Made(shape, 0.0, size.area) if region.surface else Made(shape, size.volume, size.area, size.centroid)
+        for shape, size in made
+    ]
 
 
 def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:

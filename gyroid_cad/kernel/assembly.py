@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader
@@ -19,13 +19,15 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import LabelSequence
 from gyroid_cad.kernel.step import reading_step, write_parts
 from gyroid_cad.kernel.step_solids import read_step_bodies
 from gyroid_cad.step.header import StepHeader, product_name
-from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart
+from gyroid_cad.step.products import Occurrence, StepPart
+from gyroid_cad.wall.areas import ShapeSize, joint_size
 
 __all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
 
@@ -104,8 +106,15 @@ def write_assembly(
         part.name, read_step_bodies(part.shape), part.colour, face_names=names, face_colours=colours, size=part.size
     )
     occurrences = [Occurrence(0, called, (place, *_AXES)) for called, place in places]
-    whole = ShapeSize(len(occurrences) * part.size.volume, len(occurrences) * part.size.area)
+    whole = joint_size([_shifted(part.size, one.frame[0]) for one in occurrences])
     write_parts(part.shape, path, header, product, [written], occurrences, whole)
+
+
+def _shifted(size: ShapeSize, shift: Point) -> ShapeSize:
+    if size.centroid is None:
+        return size
+    (x, y, z), (dx, dy, dz) = size.centroid, shift
+    return replace(size, centroid=(x + dx, y + dy, z + dz))
 
 
 def new_document() -> TDocStd_Document:

@@ -32,6 +32,7 @@ from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
 from gyroid_cad.trim.sections import section_knots
+from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["FaceSizes", "crossed_pieces"]
@@ -322,15 +323,21 @@ class FaceSizes:
             self._orientations.append(face.Orientation())
         self._measures, self._middle = measures, middle
 
-    def of(self, shape: TopoDS_Shape) -> tuple[float, float]:
-        """Volume in mm3, negative if the shape is inside out, and area in mm2."""
+    def of(self, shape: TopoDS_Shape) -> ShapeSize:
+        """Its size; the volume negative if the shape is inside out, no centroid if the kernel is asked for a face."""
         volume = area = 0.0
+        moment, exact = np.zeros(3), True
         for face in parts_of(shape, TopAbs_FACE):
             index = int(self._numbers.FindIndex(face)) - 1
             if index >= 0:
                 sign = 1.0 if face.Orientation() == self._orientations[index] else -1.0
                 flux, size = sign * float(self._measures.flux[index]), float(self._measures.area[index])
+                moment += sign * self._measures.moment[index]
             else:
                 flux, size = measure_about(as_face(face), self._middle)
+                exact = False
             volume, area = volume + flux, area + size
-        return volume, area
+        if not (exact and volume):
+            return ShapeSize(volume, area)
+        x, y, z = (self._middle + moment / volume).tolist()
+        return ShapeSize(volume, area, (x, y, z))

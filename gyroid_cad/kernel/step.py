@@ -30,8 +30,9 @@ from gyroid_cad.kernel.step_geometry import UnknownGeometryError
 from gyroid_cad.kernel.step_solids import products_of
 from gyroid_cad.step.counts import Topology, require_counts
 from gyroid_cad.step.header import DESCRIPTION, PROGRAM, StepHeader, product_name, time_stamp
-from gyroid_cad.step.products import Occurrence, ShapeSize, StepPart, write_products
+from gyroid_cad.step.products import Occurrence, StepPart, write_products
 from gyroid_cad.step.text import escaped
+from gyroid_cad.wall.areas import ShapeSize, joint_size
 
 __all__ = [
     "no_messages",
@@ -66,7 +67,7 @@ def write_step(
     path: str | os.PathLike[str],
     header: StepHeader = _PLAIN,
     name: str | None = None,
-    size: ShapeSize | None = None,
+    sizes: Sequence[ShapeSize] = (),
     body_names: Sequence[str] = (),
 ) -> None:
     """Write a shape in millimetres.
@@ -84,10 +85,11 @@ def write_step(
     header : StepHeader
     name : str, optional
         Of the product; the file's stem if left out.
-    size : ShapeSize, optional
-        For receivers to compare what they find with; where the kernel's writer is asked, it is left out.
+    sizes : sequence of ShapeSize
+        For receivers to compare what they find with, one a body as the kernel counts them, or none; where the kernel's
+        writer is asked, they are left out.
     body_names : sequence of str
-        One a solid, as the kernel counts them, or none; left out likewise.
+        Likewise.
 
     Raises
     ------
@@ -95,11 +97,11 @@ def write_step(
     """
     product = product_name(path, name)
     try:
-        parts, places = products_of(shape, product, body_names)
+        parts, places = products_of(shape, product, body_names, sizes)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, header, escaped(product))
     else:
-        write_parts(shape, path, header, product, parts, places, size)
+        write_parts(shape, path, header, product, parts, places, joint_size(sizes) if sizes else None)
 
 
 def write_parts(

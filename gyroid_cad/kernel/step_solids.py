@@ -30,6 +30,7 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid,
 from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement
 from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
 from gyroid_cad.step.products import Occurrence, StepPart
+from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["products_of", "read_step_bodies", "require_bodies"]
 
@@ -49,7 +50,7 @@ def read_step_bodies(shape: TopoDS_Shape) -> list[StepBody]:
 
 
 def products_of(
-    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = ()
+    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = (), sizes: Sequence[ShapeSize] = ()
 ) -> tuple[list[StepPart], list[Occurrence]]:
     """Return the parts that a shape is written as, and their places if it has a solid in several.
 
@@ -60,6 +61,8 @@ def products_of(
         Of the product.
     body_names : sequence of str
         One a body, as the kernel counts them, or none.
+    sizes : sequence of ShapeSize
+        Likewise; of bodies in several places, or of others than there are, they are left out.
 
     Raises
     ------
@@ -68,7 +71,8 @@ def products_of(
     kinds, bodies = NumberedShapes(), list(parts_of(shape, require_bodies(shape)))
     which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
     if len(bodies) == kinds.Extent():
-        return [StepPart(name, read_step_bodies(shape), body_names=body_names)], []
+        own = sizes if len(sizes) == len(bodies) else ()
+        return [StepPart(name, read_step_bodies(shape), body_names=body_names, body_sizes=own)], []
     parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
     places = [axis_placement(body.Location()) for body in bodies]
     return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.surface import face_densities, face_integrals
 
-__all__ = ["SquareQuadrature"]
+__all__ = ["SquareQuadrature", "shifted_integrals"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -41,14 +41,14 @@ class SquareQuadrature:
         self._coefficients = np.polynomial.legendre.legvander(nodes, _PER_SPAN - 1) * (order + 0.5)
         self._coefficients *= weights[:, np.newaxis]
 
-    def densities(self, nets: Floats, weights: Floats) -> Floats:
-        """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, nodes, nodes, 5)."""
-        return face_densities(nets, weights, (self.knots, self.knots), self.places, self.places)
+    def densities(self, nets: Floats, weights: Floats, moments: bool = False) -> Floats:
+        """Flux of p / 3, area vector, area and moments, as :func:`face_densities`; shape (faces, nodes, nodes, k)."""
+        return face_densities(nets, weights, (self.knots, self.knots), self.places, self.places, moments)
 
-    def over_square(self, nets: Floats, weights: Floats) -> Floats:
-        """Integrals over whole faces; shape (faces, 5)."""
-        both = np.outer(self.weights, self.weights)
-        return face_integrals(nets, weights, (self.knots, self.knots), self.places, self.places, both)
+    def over_square(self, nets: Floats, weights: Floats, moments: bool = False) -> Floats:
+        """Integrals over whole faces; shape (faces, k)."""
+        rule = self.places, self.places, np.outer(self.weights, self.weights)
+        return face_integrals(nets, weights, (self.knots, self.knots), *rule, moments=moments)
 
     def over(self, places: Floats, rates: Floats, density: Floats) -> Floats:
         """Sum over places of their shares of an integral, shape (k,)."""
@@ -90,3 +90,22 @@ class SquareQuadrature:
         integrals[:, 1:] = (legendre[:, 2:] - legendre[:, :-2]) / (2 * np.arange(1, _PER_SPAN) + 1)
         values, sums = legendre[:, :-1] @ self._coefficients.T, integrals @ self._coefficients.T
         return span.astype(np.int64), np.asarray(values), np.asarray(half[:, np.newaxis] * sums)
+
+
+def shifted_integrals(integrals: Floats, shift: Floats) -> tuple[Floats, Floats]:
+    """Flux of p / 3 and first moments of faces that are shifted, from their integrals where they were.
+
+    Parameters
+    ----------
+    integrals : ndarray, shape (..., 11)
+        As of :func:`~gyroid_cad.nurbs.surface.face_integrals`, with moments.
+    shift : ndarray, shape (..., 3)
+
+    Returns
+    -------
+    flux : ndarray, shape (...)
+    moments : ndarray, shape (..., 3)
+    """
+    vector, along, moments = integrals[..., 1:4], integrals[..., 5:8], integrals[..., 8:11]
+    flux = integrals[..., 0] + np.sum(shift * vector, axis=-1) / 3
+    return np.asarray(flux), np.asarray(moments + shift * (along + shift * vector / 2))

@@ -293,7 +293,9 @@ def _derivatives(
     return tuple(quotients(summed(nets * weight), summed(weight)).values())
 
 
-def face_integrals(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], *rule: Floats) -> Floats:
+def face_integrals(
+    nets: Floats, weights: Floats, knots: tuple[Floats, Floats], *rule: Floats, moments: bool = False
+) -> Floats:
     """Flux of p / 3, area vector and area of many faces of one basis, by quadrature.
 
     Parameters
@@ -303,26 +305,39 @@ def face_integrals(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], 
         As of :func:`grid_derivatives`.
     *rule : ndarray
         Places along u, places along v and weights of both, as of :meth:`NurbsSurface.quadrature`.
+    moments : bool
+        Whether what first moments take is wanted too.
 
     Returns
     -------
-    ndarray, shape (..., 5)
-        Of closed faces together the flux is the volume they enclose.
+    ndarray, shape (..., 5) or (..., 11)
+        As of :func:`face_densities`. Of closed faces together the flux is the volume they enclose.
     """
     u, v, both = rule
-    flat, sums = nets.reshape(-1, *nets.shape[-3:]), [np.zeros((0, 5))]
+    flat, count = nets.reshape(-1, *nets.shape[-3:]), 11 if moments else 5
+    sums = [np.zeros((0, count))]
     for first in range(0, len(flat), _FACES_AT_ONCE):
-        density = face_densities(flat[first : first + _FACES_AT_ONCE], weights, knots, u.ravel(), v.ravel())
+        some = flat[first : first + _FACES_AT_ONCE]
+        density = face_densities(some, weights, knots, u.ravel(), v.ravel(), moments)
         sums.append(np.einsum("uv,fuvk->fk", both, density))
-    return np.concatenate(sums).reshape(*nets.shape[:-3], 5)
+    return np.concatenate(sums).reshape(*nets.shape[:-3], count)
 
 
-def face_densities(nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: Floats, v: Floats) -> Floats:
-    """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, u, v, 5)."""
+def face_densities(
+    nets: Floats, weights: Floats, knots: tuple[Floats, Floats], u: Floats, v: Floats, moments: bool = False
+) -> Floats:
+    """Flux of p / 3, area vector and area of faces, per du dv; shape (faces, u, v, 5).
+
+    With moments six more: flux of (x, 0, 0), (0, y, 0) and (0, 0, z), and of (x^2 / 2, 0, 0) and so on. Of closed faces
+    together these are the volume three times, and the first moments of what they enclose.
+    """
     points, du, dv = grid_derivatives(nets, weights, knots, u, v)
     across = np.cross(du, dv)
-    flux = np.sum(points * across, axis=-1, keepdims=True) / 3
-    return np.concatenate([flux, across, np.linalg.norm(across, axis=-1, keepdims=True)], axis=-1)
+    along = points * across
+    columns = [along.sum(axis=-1, keepdims=True) / 3, across, np.linalg.norm(across, axis=-1, keepdims=True)]
+    if moments:
+        columns += [along, points * along / 2]
+    return np.concatenate(columns, axis=-1)
 
 
 def layer_areas(

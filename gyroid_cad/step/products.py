@@ -12,8 +12,9 @@ from gyroid_cad.step.bodies import LEAST_GAP, WritableBody
 from gyroid_cad.step.geometry import AxisPlacement
 from gyroid_cad.step.header import StepHeader, header_section
 from gyroid_cad.step.text import StepText, quoted, real, refs
+from gyroid_cad.wall.areas import ShapeSize
 
-__all__ = ["Occurrence", "ShapeSize", "StepPart", "write_products"]
+__all__ = ["Occurrence", "StepPart", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -40,20 +41,6 @@ _VALIDATED = (("volume", "volume measure", "VOLUME", 3), ("surface area", "surfa
 _DIGITS = 12
 
 
-@dataclass(frozen=True, slots=True)
-class ShapeSize:
-    """Size of a shape, by quadrature.
-
-    Attributes
-    ----------
-    volume, area : float
-        In mm3 and mm2, of all its bodies; shells have no volume.
-    """
-
-    volume: float
-    area: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class StepPart:
     """A part of one or several bodies, all of one kind.
@@ -66,6 +53,8 @@ class StepPart:
         By which STEP knows it; that of the file's reader if left out.
     body_names : sequence of str
         One a body, or none.
+    body_sizes : sequence of ShapeSize
+        One a body, or none; of a single body that of the product is enough.
     face_names, face_colours : sequence of str
         One a face, as the kernel counts them, or none.
     size : ShapeSize, optional
@@ -75,6 +64,7 @@ class StepPart:
     bodies: Sequence[WritableBody]
     colour: str = ""
     body_names: Sequence[str] = ()
+    body_sizes: Sequence[ShapeSize] = ()
     face_names: Sequence[str] = ()
     face_colours: Sequence[str] = ()
     size: ShapeSize | None = None
@@ -125,7 +115,7 @@ def write_products(
         products = _Products(text, header.schema)
         whole = products.assembly(name, parts, occurrences) if occurrences else products.part(parts[0], name)
         if size is not None:
-            products.validate(whole, size)
+            products.validate(whole.shape, whole.context, size)
         out.write(b"ENDSEC;\nEND-ISO-10303-21;\n")
 
 
@@ -183,11 +173,21 @@ class _Products:
         if part.colour:
             self._colour(part, numbers, product.context)
         if part.size is not None:
-            self.validate(product, part.size)
+            self.validate(product.shape, product.context, part.size)
+        if len(numbers) > 1 and part.body_sizes:
+            for (body, _), size in zip(numbers, part.body_sizes, strict=True):
+                self.validate(self._aspect(product, body), product.context, size)
         return product
 
-    def validate(self, product: _Product, size: ShapeSize) -> None:
-        """Say how large a product is."""
+    def _aspect(self, product: _Product, body: int) -> int:
+        """Make a body something that has properties of its own, as the practice does."""
+        add = self.text.add
+        aspect = add(f"SHAPE_ASPECT('','',#{product.shape},.F.)")
+        add(f"GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#{aspect},#{product.representation},#{body})")
+        return aspect
+
+    def validate(self, shape: int, context: int, size: ShapeSize) -> None:
+        """Say how large a shape is, of a product or an aspect of it, and where its centre is."""
         add, once = self.text.add, self.text.once
         for (name, item, measure, power), value in zip(_VALIDATED, (size.volume, size.area), strict=True):
             if not value:
@@ -195,9 +195,15 @@ class _Products:
             shown = real(float(f"{value:.{_DIGITS}g}"))
             unit = once(f"DERIVED_UNIT({refs([once(f'DERIVED_UNIT_ELEMENT(#{self._millimetre()},{power}.)')])})")
             measured = add(f"MEASURE_REPRESENTATION_ITEM('{item}',{measure}_MEASURE({shown}),#{unit})")
-            representation = add(f"REPRESENTATION('{name}',(#{measured}),#{product.context})")
-            defined = add(f"PROPERTY_DEFINITION('geometric validation property','{name}',#{product.shape})")
-            add(f"PROPERTY_DEFINITION_REPRESENTATION(#{defined},#{representation})")
+            self._property(shape, context, name, measured)
+        if size.centroid is not None:
+            place = ",".join(real(float(f"{coordinate:.{_DIGITS}g}")) for coordinate in size.centroid)
+            self._property(shape, context, "centroid", add(f"CARTESIAN_POINT('centre point',({place}))"))
+
+    def _property(self, shape: int, context: int, name: str, item: int) -> None:
+        representation = self.text.add(f"REPRESENTATION('{name}',(#{item}),#{context})")
+        defined = self.text.add(f"PROPERTY_DEFINITION('geometric validation property','{name}',#{shape})")
+        self.text.add(f"PROPERTY_DEFINITION_REPRESENTATION(#{defined},#{representation})")
 
     def _define(self, product: _Product) -> None:
         self.text.add(f"SHAPE_DEFINITION_REPRESENTATION(#{product.shape},#{product.representation})")

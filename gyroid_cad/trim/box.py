@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.graph import connected
 from gyroid_cad.errors import KernelError
-from gyroid_cad.nurbs.quadrature import SquareQuadrature
+from gyroid_cad.nurbs.quadrature import SquareQuadrature, shifted_integrals
 from gyroid_cad.trim.caps import Cap, CapArc, caps_of
 from gyroid_cad.trim.edge_crossings import PLANES, FacesToCut
 from gyroid_cad.trim.sections import Sections
@@ -129,6 +129,8 @@ class TrimmedWall:
         Which connected piece of the boundary each belongs to.
     volumes, areas : ndarray, shape (components,)
         In mm3 and mm2, by Green's theorem over the pieces.
+    centroids : ndarray, shape (components, 3)
+        In mm, in the wall's own space, likewise; of no use if it is not closed.
     distinct : int
         Faces that had to be cut, all alike counted once.
     capped : bool
@@ -144,6 +146,7 @@ class TrimmedWall:
     component: Integers
     volumes: Floats
     areas: Floats
+    centroids: Floats
     distinct: int
     capped: bool
 
@@ -190,6 +193,7 @@ class _Assembly:
     fluxes: list[float] = field(default_factory=list)
     areas: list[float] = field(default_factory=list)
     vectors: list[Floats] = field(default_factory=list)
+    moments: list[Floats] = field(default_factory=list)
     distinct: int = 0
 
     def __post_init__(self) -> None:
@@ -227,8 +231,10 @@ class _Assembly:
         areas = self.areas + [cap.area for cap in caps]
         if capped:
             self._require_no_gap(caps, sum(areas))
-        count = int(component.max()) + 1 if len(component) else 0
-        totals = [np.asarray(np.bincount(component, values, count), dtype=np.float64) for values in (fluxes, areas)]
+        moments = self.moments + [cap.moments(levels[cap.plane]) for cap in caps]
+        totals = np.zeros((int(component.max(initial=-1)) + 1, 5))
+        np.add.at(totals, component, np.column_stack([fluxes, areas, np.reshape(moments, (-1, 3))]))
+        centroids = self.middle + totals[:, 2:] / (totals[:, :1] if capped else 1.0)
         points = [point @ self.box.axes.T for point in self.points]
         return TrimmedWall(
             self.wall,
@@ -238,8 +244,9 @@ class _Assembly:
             self.faces,
             caps,
             component,
-            totals[0],
-            totals[1],
+            totals[:, 0],
+            totals[:, 1],
+            centroids @ self.box.axes.T,
             self.distinct,
             capped,
         )
@@ -269,10 +276,11 @@ class _Assembly:
     def _add_whole(self, patches: Integers, side: int, backwards: bool) -> None:
         quadrature = SquareQuadrature(self.wall.knots)
         used, which = np.unique(self.wall.patch_net[patches], return_inverse=True)
-        sums = quadrature.over_square(self.nets[used, side], self.wall.weights)[which]
+        sums = quadrature.over_square(self.nets[used, side], self.wall.weights, moments=True)[which]
         sign = -1.0 if backwards else 1.0
-        offsets = self.shifts[patches] - self.middle
-        self.fluxes += (sign * (sums[:, 0] + np.sum(offsets * sums[:, 1:4], axis=1) / 3)).tolist()
+        fluxes, moments = shifted_integrals(sums, self.shifts[patches] - self.middle)
+        self.fluxes += (sign * fluxes).tolist()
+        self.moments += list(sign * moments)
         self.areas += sums[:, 4].tolist()
         self.vectors += list(sign * sums[:, 1:4])
         patch_edges = [list(range(4))]
@@ -287,9 +295,11 @@ class _Assembly:
             loops = [[self._edge(patch, side, cut, arc, backwards) for arc in loop] for loop in piece.loops]
             patch_edges = [[arc.side for arc in loop] for loop in piece.loops]
             self.faces.append(BoxFace(patch, side, loops, patch_edges, backwards))
-            self.fluxes.append(sign * (piece.flux + float(offset @ piece.area_vector) / 3))
-            self.areas.append(piece.area)
-            self.vectors.append(sign * piece.area_vector)
+            flux, moments = shifted_integrals(piece.integrals, offset)
+            self.fluxes.append(sign * float(flux))
+            self.moments.append(sign * moments)
+            self.areas.append(float(piece.integrals[4]))
+            self.vectors.append(sign * piece.integrals[1:4])
 
     def _edge(self, patch: int, side: int, cut: CutFace, arc: Arc, backwards: bool) -> tuple[int, bool]:
         if arc.curve < 0:

@@ -86,6 +86,11 @@ class Cap:
     loops: list[list[tuple[int, bool]]]
     area: float
 
+    def moments(self, level: float) -> Floats:
+        """Flux of x^2 / 2 along each axis out of it, where its plane is at a level, in mm4."""
+        axis, sign = PLANES[self.plane]
+        return np.asarray(-sign * level**2 / 2 * self.area * np.eye(3)[axis])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Link:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.nurbs.basis import gauss_points
-from gyroid_cad.nurbs.quadrature import SquareQuadrature
+from gyroid_cad.nurbs.quadrature import SquareQuadrature, shifted_integrals
 from gyroid_cad.trim.boundary import BoundaryFace
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.free_surfaces import FreeForm, Swept
@@ -44,27 +44,30 @@ class PieceMeasures:
         Of (p - middle) / 3 through each, in mm3: of a closed surface the volume in it.
     area : ndarray, shape (pieces,)
         In mm2.
+    moment : ndarray, shape (pieces, 3)
+        Flux of (p - middle)^2 / 2 along each axis, in mm4: of a closed surface the first moments of the volume in it.
     """
 
     flux: Floats
     area: Floats
+    moment: Floats
 
 
 def joined(*measures: PieceMeasures) -> PieceMeasures:
     """PieceMeasures of several sets of pieces, one after the other."""
-    return PieceMeasures(*(np.concatenate([getattr(some, name) for some in measures]) for name in ("flux", "area")))
+    names = ("flux", "area", "moment")
+    return PieceMeasures(*(np.concatenate([getattr(some, name) for some in measures]) for name in names))
 
 
 def whole_measures(faces: LatticeFaces, backwards: Booleans, middle: Floats) -> PieceMeasures:
     """Measure whole faces of a wall; those used against their normal are told by a mask."""
     if not len(faces):
-        return PieceMeasures(np.zeros(0), np.zeros(0))
+        return PieceMeasures(np.zeros(0), np.zeros(0), np.zeros((0, 3)))
     wall = faces.wall
     pairs, index = np.unique(np.stack([wall.patch_net[faces.patch], faces.side]), axis=1, return_inverse=True)
-    sums = SquareQuadrature(wall.knots).over_square(wall.nets_of(*pairs), wall.weights)[index.ravel()]
+    sums = SquareQuadrature(wall.knots).over_square(wall.nets_of(*pairs), wall.weights, moments=True)[index.ravel()]
     shift = wall.shifts[wall.patch_shift[faces.patch]] - middle
-    sign = np.where(backwards, -1.0, 1.0)
-    return PieceMeasures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
+    return _placed(sums, shift, backwards)
 
 
 def lattice_measures(cut: Crossing, middle: Floats) -> PieceMeasures:
@@ -72,25 +75,27 @@ def lattice_measures(cut: Crossing, middle: Floats) -> PieceMeasures:
     wall, faces = cut.faces.wall, cut.faces
     face = np.array([piece.face for piece in cut.lattice], dtype=np.int64)
     if not len(face):
-        return PieceMeasures(np.zeros(0), np.zeros(0))
+        return PieceMeasures(np.zeros(0), np.zeros(0), np.zeros((0, 3)))
     places, rates, piece = _square_borders(cut)
     nets, of_piece = np.unique(
         np.stack([wall.patch_net[faces.patch[face]], faces.side[face]], axis=1), axis=0, return_inverse=True
     )
     quadrature = SquareQuadrature(wall.knots)
-    sums = np.zeros((len(face), 5))
+    sums = np.zeros((len(face), 11))
     # Places come in the order of their nets, so that the samples of one are held at a time.
     for net, some in grouped(of_piece.ravel()[piece]):
-        density = quadrature.densities(wall.nets_of(*nets[net, :, np.newaxis]), wall.weights)[0]
+        density = quadrature.densities(wall.nets_of(*nets[net, :, np.newaxis]), wall.weights, moments=True)[0]
         for rows in np.split(some, range(_AT_ONCE, len(some), _AT_ONCE)):
             np.add.at(sums, piece[rows], quadrature.shares(places[rows], rates[rows], density))
     shift = wall.shifts[wall.patch_shift[faces.patch[face]]] - middle
-    sign = np.where(cut.backwards[face], -1.0, 1.0)
-    return PieceMeasures(sign * (sums[:, 0] + dot(shift, sums[:, 1:4]) / 3), sums[:, 4])
+    return _placed(sums, shift, cut.backwards[face])
 
 
-def _in_order(found: list[tuple[int, float]]) -> Floats:
-    return np.array([value for _, value in sorted(found)])
+def _placed(sums: Floats, shift: Floats, backwards: Booleans) -> PieceMeasures:
+    """Measures of pieces of the wall's faces, from their integrals where the distinct patches are."""
+    sign = np.where(backwards, -1.0, 1.0)
+    flux, moment = shifted_integrals(sums, shift)
+    return PieceMeasures(sign * flux, sums[:, 4], sign[:, np.newaxis] * moment)
 
 
 Stretch = tuple[Floats, Floats, Floats, Floats]
@@ -180,21 +185,20 @@ def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], S
 
 def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> PieceMeasures:
     """Measure pieces of the part's faces."""
-    flux, area = [], []
+    totals = np.zeros((len(pieces), 5))
     samples: tuple[int, _Samples] | None = None
     for index in sorted(range(len(pieces)), key=lambda k: pieces[k].face):
         face = cut.boundary.faces[pieces[index].face]
         if samples is None or samples[0] != pieces[index].face:
             samples = pieces[index].face, _Samples(face, middle)
         places, rates = _part_border(cut, pieces[index])
-        total = samples[1].over(places, rates)
-        flux.append((index, face.sign * float(total[0])))
-        area.append((index, float(total[1])))
-    return PieceMeasures(_in_order(flux), _in_order(area))
+        totals[index] = samples[1].over(places, rates)
+    sign = np.array([cut.boundary.faces[piece.face].sign for piece in pieces], dtype=np.float64)
+    return PieceMeasures(sign * totals[:, 0], totals[:, 1], sign[:, np.newaxis] * totals[:, 2:])
 
 
 class _Samples:
-    """Densities of flux and area of a face of the part, sampled on a square in place of its parameters."""
+    """Densities of flux, area and moments of a face of the part, sampled on a square in place of its parameters."""
 
     def __init__(self, face: BoundaryFace, middle: Floats) -> None:
         self.low, high = face.range
@@ -205,7 +209,8 @@ class _Samples:
         places = self.low + self.scale * (grid + 1)
         vectors, points = face.surface.area_vectors(places), face.surface.points(places)
         flux, area = dot(points - middle, vectors) / 3, np.linalg.norm(vectors, axis=1)
-        self.density = np.stack([flux, area], axis=-1).reshape(len(nodes), len(nodes), 2) * np.prod(self.scale)
+        density = np.column_stack([flux, area, (points - middle) ** 2 * vectors / 2])
+        self.density = density.reshape(len(nodes), len(nodes), 5) * np.prod(self.scale)
 
     def _knots(self, surface: PartSurface) -> Floats:
         """Knots on [-1, 1] along both parameters, such that the densities are smooth between them."""

@@ -72,18 +72,12 @@ class FacePiece:
     ----------
     loops : list of list of Arc
         The outer one first, what is left of the face on their left.
-    flux : float
-        Of p / 3 through it, in mm3.
-    area_vector : ndarray, shape (3,)
-        In mm2.
-    area : float
-        In mm2.
+    integrals : ndarray, shape (11,)
+        As of :func:`~gyroid_cad.nurbs.surface.face_integrals`, with moments.
     """
 
     loops: list[list[Arc]]
-    flux: float
-    area_vector: Floats
-    area: float
+    integrals: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +168,7 @@ class _Cutting:
 
     def run(self) -> list[CutFace]:
         quadrature = SquareQuadrature(self.faces.knots)
-        densities = quadrature.densities(self.faces.nets, self.faces.weights)
+        densities = quadrature.densities(self.faces.nets, self.faces.weights, moments=True)
         found = [self._edge_points(curves) for curves in self.curves]
         arcs = [self._arcs(face, on_curves) for face, (_, _, on_curves) in enumerate(found)]
         cut = []
@@ -320,7 +314,7 @@ class _Cutting:
             rate = 1.0 if arc.curve < 0 else self.sections.in_square(curves[arc.curve], t, 1)[:, 1]
             rates.append(weights * rate)
         total = quadrature.over(np.concatenate(places), np.concatenate(rates), density)
-        return FacePiece(loops, float(total[0]), total[1:4], float(total[4]))
+        return FacePiece(loops, total)
 
 
 def _stretches(side: int, curve: int, stops: list[float], nodes: list[Node]) -> list[Arc]:

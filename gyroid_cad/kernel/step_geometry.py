@@ -44,8 +44,6 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-_UNTURNED = np.eye(3)
-
 
 class UnknownGeometryError(Exception):
     """Something that only the kernel's own writer can put into words: an offset surface, say, or a face of no solid."""
@@ -63,10 +61,7 @@ class Geometries:
         self.found: list[Geometry] = []
         # Kept alive, so that ids stay their own.
         self._read: dict[int, tuple[Geom_Geometry, Geometry]] = {}
-        self._numbers: dict[tuple[int, int], int] = {}
-        self._places: dict[bytes, int] = {}
-        # By the location's hash, with which it is found again; of a lattice there are few.
-        self._matrices: dict[int, list[tuple[TopLoc_Location, int, Floats | None]]] = {}
+        self._numbers: dict[tuple[int, bytes], int] = {}
 
     def number(self, geometry: Geom_Geometry | None, location: TopLoc_Location) -> int:
         """Index in ``found`` of a curve or surface that a location moves.
@@ -75,24 +70,12 @@ class Geometries:
         ------
         UnknownGeometryError
         """
-        place, matrix = self._placed(location)
-        key = id(geometry), place
+        matrix = _matrix(location)
+        key = id(geometry), b"" if matrix is None else matrix.tobytes()
         if key not in self._numbers:
             self._numbers[key] = len(self.found)
             self.found.append(self._moved(geometry, location, matrix))
         return self._numbers[key]
-
-    def _placed(self, location: TopLoc_Location) -> tuple[int, Floats | None]:
-        """Number and matrix of a location."""
-        alike = self._matrices.setdefault(hash(location), [])
-        for known, number, matrix in alike:
-            if known.IsEqual(location):
-                return number, matrix
-        # Told apart by their values: the kernel tells them by how they were made.
-        matrix = _matrix(location)
-        number = self._places.setdefault(b"" if matrix is None else matrix.tobytes(), len(self._places))
-        alike.append((location, number, matrix))
-        return number, matrix
 
     def _moved(self, geometry: Geom_Geometry | None, location: TopLoc_Location, matrix: Floats | None) -> Geometry:
         if id(geometry) not in self._read:
@@ -102,8 +85,7 @@ class Geometries:
             return read
         if isinstance(read, Spline):
             # Of a lattice many are translates of few.
-            turned = read.poles if np.array_equal(matrix[:, :3], _UNTURNED) else read.poles @ matrix[:, :3].T
-            return replace(read, poles=turned + matrix[:, 3])
+            return replace(read, poles=read.poles @ matrix[:, :3].T + matrix[:, 3])
         return read_geometry(geometry.Transformed(location.Transformation()))
 
 

@@ -118,12 +118,12 @@ class StepBody:
         """
         geometries = text.geometries([*self.surfaces, *self.curves])
         points = text.points(np.array(self.vertices).reshape(-1, 3))
-        vertices = _numbers(text.table("VERTEX_POINT('',", points, ")"))
+        vertices = text.table("VERTEX_POINT('',", points, ")")
         edges = np.zeros(0, dtype=np.int64)
         if self.edges:
             first, last, curve = np.array(self.edges).T
             curves = geometries[len(self.surfaces) :][curve]
-            edges = _numbers(text.table("EDGE_CURVE('',", vertices[first], ",", vertices[last], ",", curves, ",.T.)"))
+            edges = text.table("EDGE_CURVE('',", vertices[first], ",", vertices[last], ",", curves, ",.T.)")
         all_faces = [face for shell in self.shells for face in shell]
         forward = np.array([face.forward for face in all_faces])
         bounds = self._bounds(text, all_faces, vertices, edges, forward)
@@ -153,7 +153,7 @@ class StepBody:
         uses = np.array([use for loop in loops for use in loop.uses], dtype=np.int64).reshape(-1, 2)
         oriented = np.zeros(0, dtype=np.int64)
         if len(uses):
-            oriented = _numbers(text.table("ORIENTED_EDGE('',*,*,", edges[uses[:, 0]], ",", uses[:, 1] > 0, ")"))
+            oriented = text.table("ORIENTED_EDGE('',*,*,", edges[uses[:, 0]], ",", uses[:, 1] > 0, ")")
         lengths = np.array([len(loop.uses) for loop in loops])
         starts = np.cumsum(lengths) - lengths
         for length in np.unique(lengths).tolist():
@@ -166,7 +166,7 @@ class StepBody:
                 numbers[which] = text.table("VERTEX_LOOP('',", ends, ")")
         bounds = text.table("FACE_BOUND('',", numbers, ",", forward[face_of], ")")
         found: list[list[int]] = [[] for _ in faces]
-        for face, bound in zip(face_of.tolist(), bounds, strict=True):
+        for face, bound in zip(face_of.tolist(), bounds.tolist(), strict=True):
             found[face].append(bound)
         return found
 
@@ -186,15 +186,11 @@ def write_shells(text: StepText, name: str, shells: Sequence[Integers], outer: i
         Whether they bound anything.
     """
     kind = "CLOSED" if solid else "OPEN"
-    numbers = [text.table(f"{kind}_SHELL('',", shell[np.newaxis], ")")[0] for shell in shells]
+    numbers = [int(text.table(f"{kind}_SHELL('',", shell[np.newaxis], ")")[0]) for shell in shells]
     if not solid:
         return text.add(f"SHELL_BASED_SURFACE_MODEL({quoted(name)},{refs(numbers)})")
     outside = numbers.pop(outer)
     if not numbers:
         return text.add(f"MANIFOLD_SOLID_BREP({quoted(name)},#{outside})")
     voids = text.table("ORIENTED_CLOSED_SHELL('',*,", np.array(numbers), ",.F.)")
-    return text.add(f"BREP_WITH_VOIDS({quoted(name)},#{outside},{refs(voids)})")
-
-
-def _numbers(some: range) -> Integers:
-    return np.array(some, dtype=np.int64)
+    return text.add(f"BREP_WITH_VOIDS({quoted(name)},#{outside},{refs(voids.tolist())})")

@@ -60,7 +60,7 @@ class StepText:
         self._out.write(f"#{self._last}={entity};\n".encode("ascii"))
         return self._last
 
-    def table(self, *columns: str | list[str] | NDArray[Any]) -> range:
+    def table(self, *columns: str | list[str] | NDArray[Any]) -> Integers:
         """Write entities that are alike, a row each; returns their numbers.
 
         Parameters
@@ -70,16 +70,16 @@ class StepText:
             references, in nested brackets by its other axes, truth values flags, and others coordinates in mm.
         """
         count = next(len(column) for column in columns if not isinstance(column, str))
-        first = self._last + 1
+        made = np.arange(self._last + 1, self._last + 1 + count)
         self._last += count
         # A reference takes about ten bytes.
         width = 10 * sum(column[:1].size if isinstance(column, np.ndarray) else 2 for column in columns) + 1
         for rows in (slice(at, at + _BLOCK // width + 1) for at in range(0, count, _BLOCK // width + 1)):
-            numbers = np.arange(first, first + count)[rows]
-            made = [column if isinstance(column, str) else self._shown(column[rows]) for column in columns]
-            texts = [_constant("#"), integer_text(numbers), _constant("="), *map(_constant, made), _constant(";\n")]
+            numbers = made[rows]
+            shown = [column if isinstance(column, str) else self._shown(column[rows]) for column in columns]
+            texts = [_constant("#"), integer_text(numbers), _constant("="), *map(_constant, shown), _constant(";\n")]
             self._out.write(joined_rows(*(np.broadcast_to(text, (len(numbers), text.shape[-1])) for text in texts)))
-        return range(first, first + count)
+        return made
 
     def _shown(self, column: list[str] | NDArray[Any]) -> Bytes:
         if isinstance(column, list):
@@ -109,7 +109,8 @@ class StepText:
         ----------
         places : ndarray, shape (n, 3)
         """
-        return np.array(self.table("CARTESIAN_POINT('',(", *_parted(places.T, ","), "))"), dtype=np.int64)
+        x, y, z = places.T
+        return self.table("CARTESIAN_POINT('',(", x, ",", y, ",", z, "))")
 
     def shared_points(self, places: Floats) -> Integers:
         """Numbers of points, of which those at one place are one; shape (n,)."""
@@ -193,7 +194,7 @@ class StepText:
             start = f"(BOUNDED_{kind}()B_SPLINE_{kind}({start}"
             end += f")B_SPLINE_{kind}_WITH_KNOTS({_knots(knots)}){before}GEOMETRIC_REPRESENTATION_ITEM()"
             end += f"RATIONAL_B_SPLINE_{kind}({_nested(weights.tolist())})REPRESENTATION_ITEM(''){after})"
-        return np.array(self.table(start, nets, end), dtype=np.int64)
+        return self.table(start, nets, end)
 
     def _vector(self, way: Triple) -> int:
         return self.once(f"VECTOR('',#{self.direction(way)},1.)")
@@ -321,14 +322,6 @@ def _nested(values: list[float] | list[list[float]]) -> str:
 def _constant(text: str | Bytes) -> Bytes:
     """One row of bytes of a text; rows stay what they are."""
     return text_rows([text]) if isinstance(text, str) else text
-
-
-def _parted(columns: Iterable[NDArray[Any]], between: str) -> list[str | NDArray[Any]]:
-    """Columns with a text between them."""
-    parts: list[str | NDArray[Any]] = []
-    for column in columns:
-        parts += [between, column]
-    return parts[1:]
 
 
 def _references(numbers: Integers) -> Bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
@@ -21,8 +22,6 @@ Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 _BORDERS = 4
-# Of a straight line through the wall, from one side to the other.
-_ACROSS = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
 def wall_bodies(wall: Wall) -> list[WallBody]:
@@ -31,7 +30,7 @@ def wall_bodies(wall: Wall) -> list[WallBody]:
     return [WallBody(wall, np.flatnonzero(wall.complex.patch_component == piece)) for piece in pieces]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class WallBody:
     """Patches of a wall that are one solid: both faces of each, and side walls along edges that are free.
 
@@ -48,7 +47,7 @@ class WallBody:
     def solid(self) -> bool:
         return True
 
-    @property
+    @cached_property
     def gap(self) -> float:
         """Distance in mm that control points of a common border are apart in the nets: in the file they are one."""
         complex = self.wall.complex
@@ -88,10 +87,10 @@ class WallBody:
         written = _Writing(self.wall, self.patches, self._nets(), text)
         loops, surfaces, outward, patch = written.faces()
         order = np.argsort(patch, kind="stable")
-        bounds = np.array(text.table("FACE_BOUND('',", loops[order], ",", outward[order], ")"))
+        bounds = text.table("FACE_BOUND('',", loops[order], ",", outward[order], ")")
         names = [quoted(named) for named in islice(face_names, len(order))]
         rest = (",", bounds[:, np.newaxis], ",", surfaces[order], ",", outward[order], ")")
-        faces = np.array(text.table("ADVANCED_FACE(", names or "''", *rest))
+        faces = text.table("ADVANCED_FACE(", names or "''", *rest)
         return write_shells(text, name, [faces], 0, True), faces.tolist()
 
 
@@ -149,10 +148,9 @@ class _Writing:
         curves = np.zeros(nets.shape[:2], dtype=np.int64)
         for k, along in np.ndindex(_BORDERS, 2):
             some = np.flatnonzero((border == k) & (forward == along))
-            weights, knots = edge_row(self.wall.weights, k), _edge_knots(self.wall.knots, k)
-            if not along:
-                weights, knots = weights[::-1], -knots[::-1]
-            curves[some] = self._splines(nets[some], weights, (knots,))
+            like = self.wall.face(0, 0).edge(k)
+            like = like if along else like.reversed()
+            curves[some] = self._splines(nets[some], like.weights, (like.knots,))
         rims = np.zeros((int(self.edge.max()) + 1, len(SIDES)), dtype=np.int64)
         first, last = self.vertices[start], self.vertices[end]
         rims[self.edge] = _table(self.text, "EDGE_CURVE('',", first, ",", last, ",", curves, ",.T.)")
@@ -161,7 +159,8 @@ class _Writing:
     def _posts(self, fans: Integers) -> Integers:
         """Write the straight edges through the wall at fans that do not close round their corner; by fan."""
         posts = np.zeros(len(self.vertices), dtype=np.int64)
-        curves = self._splines(self.fan_points[fans], np.ones(2), (_ACROSS,))
+        # Where two side walls meet, as these run across.
+        curves = self._splines(self.fan_points[fans], np.ones(2), (self.wall.side_wall(0, 0).knots_v,))
         below, above = self.vertices[fans].T
         posts[fans] = _table(self.text, "EDGE_CURVE('',", below, ",", above, ",", curves, ",.T.)")
         return posts
@@ -191,12 +190,12 @@ class _Writing:
         """Write the ruled surfaces through the wall along a border of patches."""
         # By patch, place along the border, and side.
         rows = edge_row(self.net_points[patches].transpose(2, 3, 0, 1), k).transpose(1, 0, 2)
-        weights = np.repeat(edge_row(self.wall.weights, k)[:, np.newaxis], len(SIDES), axis=1)
-        return self._splines(rows, weights, (_edge_knots(self.wall.knots, k), _ACROSS))
+        like = self.wall.side_wall(0, k)
+        return self._splines(rows, like.weights, (like.knots_u, like.knots_v))
 
     def _loops(self, edges: Integers, along: Booleans) -> Integers:
         oriented = _table(self.text, "ORIENTED_EDGE('',*,*,", edges, ",", along, ")")
-        return np.array(self.text.table("EDGE_LOOP('',", oriented, ")"), dtype=np.int64)
+        return self.text.table("EDGE_LOOP('',", oriented, ")")
 
     def _splines(self, nets: Integers, weights: Floats, knots: tuple[Floats, ...]) -> Integers:
         """Write splines alike, by the numbers of their control points in the last axes."""
@@ -215,13 +214,8 @@ def _rows(nets: Floats, forward: Booleans) -> Floats:
     return np.where(forward[:, :, np.newaxis, np.newaxis, np.newaxis], rows, rows[:, :, :, ::-1])
 
 
-def _edge_knots(knots: Floats, k: int) -> Floats:
-    """Knots along border k, as the patch runs round it: backwards along its last two."""
-    return knots if k < _BORDERS // 2 else -knots[::-1]
-
-
 def _table(text: StepText, *columns: str | Integers | Booleans) -> Integers:
     """Write a table whose columns are arrays of one shape; returns the numbers in that shape."""
     shape = next(column.shape for column in columns if not isinstance(column, str))
     flat = [column if isinstance(column, str) else column.ravel() for column in columns]
-    return np.array(text.table(*flat), dtype=np.int64).reshape(shape)
+    return text.table(*flat).reshape(shape)

@@ -15,6 +15,7 @@ from gyroid_cad.common.choices import Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
+from gyroid_cad.filling.clearing import clear_frame
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
@@ -47,7 +48,7 @@ def fill(
     thickness: FieldLike | None = None,
     density: FieldLike | None = None,
     kind: Kind = SHEET,
-    origin: Point = (0.0, 0.0, 0.0),
+    origin: Point | None = None,
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
     drop_islands: bool = False,
@@ -87,6 +88,8 @@ def fill(
         The wall; one of the two networks it parts; both of them, the wall left out; or the mid-surface alone.
     origin, rotation : tuple of float
         Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
+        Left out, and if no lattice is given, the origin is (0, 0, 0) or a few hundredths of a cell beside, where edges
+        would come out too short for who receives the solid: the report says so.
     fit : FitSettings, optional
     drop_islands : bool
         Drop every island: pieces not connected to the largest one. If not, small ones are dropped, which have less
@@ -148,7 +151,7 @@ def fill(
     >>> abs(filled.report.density - 0.3) < 0.01
     True
     """
-    frame = frame_of(*placement(origin, rotation))
+    frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
     rule = island_rule(keep_islands, drop_islands)
@@ -172,16 +175,23 @@ def fill(
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
         warn_caller(remark, PartWarning)
-    made, islands = [], Islands()
-    for (name, whole), faces in zip(parts, opened_faces(parts, openings), strict=True):
+    fillings, made, islands = [], [], Islands()
+    naming = [functools.partial(naming_triangles, kind, name if len(parts) > 1 else "") for name, _ in parts]
+    for (name, whole), faces, named in zip(parts, opened_faces(parts, openings), naming, strict=True):
         told = progress if len(parts) == 1 else named_progress(progress, name)
         forecast = foreseen(whole)
         report_progress(told, str(forecast), 0, round(forecast.seconds))
-        with naming_triangles(kind, name if len(parts) > 1 else ""):
+        with named():
             hollow = _hollow(whole, shell, faces, core)
-            inner = whole if hollow is None else hollow.core
-            filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
-            outcome = filling.run(frame)
+        inner = whole if hollow is None else hollow.core
+        fillings.append(Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told))
+    clear = frame
+    if origin is None and lattice is None:
+        clear = clear_frame(fillings, frame, size)
+    for filling, named in zip(fillings, naming, strict=True):
+        with named():
+            outcome = filling.run(clear)
+        outcome = replace(outcome, shift=outcome.shift + clear.origin - frame.origin)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
         domains, voids = without_specks(domains, filling)
         made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,18 +16,22 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
+from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
 from gyroid_cad.kernel.check import compound_of, is_valid, measure, sealed_shells, topology, without_shells
 from gyroid_cad.kernel.part import Part, require_part, sound_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.trim.clearance import NearMisses, near_misses
 from gyroid_cad.trim.islands import SealedVoid, piece_size, speck_below
-from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
+from gyroid_cad.trim.lattice_faces import LatticeFaces
+from gyroid_cad.wall.covering import CROSSING, PERTURBATIONS, Frame, first_success
 
 __all__ = [
     "Filling",
@@ -41,6 +45,7 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # Share of all volume that a piece may be below zero by: rounding.
 _INSIDE_OUT = 1e-9
@@ -77,7 +82,7 @@ class Outcome:
     by_sections: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Filling:
     """A part to be filled: all that stays the same however the lattice is shifted.
 
@@ -104,6 +109,33 @@ class Filling:
     progress: Progress | None
     seconds: dict[str, float] = field(default_factory=dict)
 
+    @cached_property
+    def infill_at(self) -> Callable[[Frame], Infill]:
+        """The lattice in a frame, made once for each."""
+        made: dict[tuple[float, ...], Infill] = {}
+
+        def infill(frame: Frame) -> Infill:
+            key = tuple(frame.origin.tolist())
+            if key not in made:
+                made[key] = self.infill_in(frame, self.timed)
+            return made[key]
+
+        return infill
+
+    @cached_property
+    def boundary(self) -> ReadBoundary:
+        """Boundary of what is filled, as numbers.
+
+        Raises
+        ------
+        KernelError
+        """
+        return read_boundary(self.core.shape)
+
+    @cached_property
+    def _extent(self) -> PartExtent:
+        return PartExtent(self.core, self.cell_size)
+
     @property
     def core(self) -> Part:
         """The part that is filled: the whole one, or what its skin leaves of it."""
@@ -124,7 +156,10 @@ class Filling:
         points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
         with self.timed("cover"):
             points = points[self.core.contains(points)]
-        infill_at = cache(lambda phase: self._shifted(frame, phase))
+
+        def infill_at(phase: Point) -> Infill:
+            return self.infill_at(replace(frame, origin=frame.origin + np.array(phase) * self.cell_size))
+
         # Faces that touch the part are in doubt there: first shift, and only then ask the kernel; the last time in one
         # process, should it be the joining of regions that fails.
         attempts: list[tuple[Road, Point, int | None]] = [
@@ -140,9 +175,29 @@ class Filling:
             for number, (road, phase, processes) in enumerate(attempts, 1)
         )
 
-    def _shifted(self, frame: Frame, phase: Point) -> Infill:
-        """The lattice, shifted by so many cells."""
-        return self.infill_in(replace(frame, origin=frame.origin + np.array(phase) * self.cell_size), self.timed)
+    def near_misses(self, frame: Frame, within: float) -> NearMisses:
+        """Places where the lattice in a frame is so near to the part's edges and faces, in mm; none if it ends.
+
+        Raises
+        ------
+        ParameterError, SelfIntersectionError, FitError
+        """
+        infill = self.infill_at(frame)
+        if not infill.endless:
+            return NearMisses.joined([])
+        with self.timed("cover"):
+            crossing = np.flatnonzero(self.sides(infill) == CROSSING)
+            sides = sorted({side for region in self.regions for side, _ in region.sides})
+            faces = LatticeFaces(infill.wall, np.tile(crossing, len(sides)), np.repeat(sides, len(crossing)))
+            try:
+                return near_misses(faces, self.boundary.boundary, within)
+            except KernelError:
+                # What ails the part is found again, and said, where it is cut.
+                return NearMisses.joined([])
+
+    def sides(self, infill: Infill) -> Integers:
+        """Side of the part on which each patch lies, or that it may be crossed."""
+        return infill.sides(self._extent.clearance, self.core.contains)
 
     def _attempt(self, number: int, *given: Any) -> Outcome:
         """Fill, and announce it where it fails: another attempt takes as long again."""

@@ -153,7 +153,7 @@ class FillReport:
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
             ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
             *([("sealed voids", self._voids_shown())] if self.voids else []),
-            *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
+            *([("shifted by", f"{self._shift_shown()} mm: where it stood, cuts failed or left edges too short")] if any(self.shift) else []),
         ]
 
     def _counted(self) -> tuple[str, str]:
@@ -162,6 +162,9 @@ class FillReport:
             return "solids, triangles", f"{self.solids}, {self.faces:,} ({within})"
         state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
         return "solids, faces", f"{self.solids}, {self.faces} ({state})"
+
+    def _shift_shown(self) -> str:
+        return f"({', '.join(f'{along:.4g}' for along in self.shift)})"
 
     def _voids_shown(self) -> str:
         shown = "; ".join(map(str, self.voids[:_VOIDS_SHOWN]))

@@ -16,10 +16,9 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
-from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
-from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
+from gyroid_cad.kernel.boundary import ReadBoundary
 from gyroid_cad.kernel.check import measure
 from gyroid_cad.kernel.crossed import FaceSizes, crossed_pieces
 from gyroid_cad.kernel.part import Part
@@ -76,6 +75,9 @@ class Job(Protocol):
     def cell_size(self) -> float: ...
     @property
     def progress(self) -> Progress | None: ...
+    @property
+    def boundary(self) -> ReadBoundary: ...
+    def sides(self, infill: Infill) -> NDArray[np.int64]: ...
     def timed(self, stage: str) -> AbstractContextManager[None]: ...
 
 
@@ -152,9 +154,7 @@ def _patches_of(left: TrimmedWall) -> tuple[int, int]:
 def _by_crossings(job: Job, infill: Infill) -> Found:
     """Fill any part: the curves in which the lattice crosses its boundary are found by number."""
     with job.timed("cover"):
-        extent = PartExtent(job.core, job.cell_size)
-        sides = infill.sides(extent.clearance, job.core.contains)
-        read = read_boundary(job.core.shape)
+        sides, read = job.sides(infill), job.boundary
     crossing, inside = (np.flatnonzero(sides == side) for side in (CROSSING, INSIDE))
     made = {region.name: _crossed(job, infill, region, read, crossing, inside) for region in job.regions}
     return made, len(crossing), len(inside)
@@ -203,7 +203,7 @@ def _crossed(
 def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:
     """Fill any part by the kernel's general fuse."""
     with job.timed("cover"):
-        sides = infill.sides(PartExtent(job.core, job.cell_size).clearance, job.core.contains)
+        sides = job.sides(infill)
     made = {}
     for region in job.regions:
         with job.timed("faces"):

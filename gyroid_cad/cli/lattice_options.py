@@ -173,8 +173,8 @@ _INFILL_OPTIONS = (
         nargs=3,
         type=float,
         metavar="X Y Z",
-        help="Where the lattice's own origin is placed, in mm; fields and maps go with it. Left out it is 0 0 0, or in a "
-        "part a little beside where edges would be too short.",
+        help="Where the lattice's own origin is placed, in mm; fields and maps go with it. Left out it is 0 0 0, or "
+        "in a part a little beside where edges would be too short.",
     ),
     click.option(
         "--rotation",

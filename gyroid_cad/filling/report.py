@@ -153,7 +153,11 @@ class FillReport:
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
             ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
             *([("sealed voids", self._voids_shown())] if self.voids else []),
-            *([("shifted by", f"{self._shift_shown()} mm: where it stood, cuts failed or left edges too short")] if any(self.shift) else []),
+            *(
+                [("shifted by", f"{self._shift_shown()} mm: where it stood, cuts failed or left edges too short")]
+                if any(self.shift)
+                else []
+            ),
         ]
 
     def _counted(self) -> tuple[str, str]:

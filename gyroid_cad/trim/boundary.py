@@ -202,7 +202,7 @@ class BoundaryFace:
         return inside
 
     def comes_near(self, places: Floats, distance: float) -> Booleans:
-        """Mask of the parameters (n, 2) that belong to the face, or are no further beside it than so many mm or some."""
+        """Mask of the parameters (n, 2) that belong to the face, or are some mm beside it, a little more or less."""
         low, high = self.range
         scale = np.maximum(high - low, np.finfo(float).tiny)
         sides = ((end - low) / scale for end in self._sides(_SAGS[0]))

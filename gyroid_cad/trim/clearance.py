@@ -188,9 +188,7 @@ def _near_edges(
 def _near_corners(faces: LatticeFaces, corners: Floats, within: float) -> NearMisses:
     """Faces near corners (n, 3) of the part."""
     low, high = (reach(faces.nets, axis=(1, 2)) for reach in (np.min, np.max))
-    face, corner = np.nonzero(
-        np.all((low[:, None] <= corners + within) & (high[:, None] >= corners - within), axis=-1)
-    )
+    face, corner = np.nonzero(np.all((low[:, None] <= corners + within) & (high[:, None] >= corners - within), axis=-1))
     if not len(face):
         return NearMisses.joined([])
     heights, places = faces.heights(face, corners[corner, None])

@@ -193,7 +193,7 @@ def _near_corners(faces: LatticeFaces, corners: Floats, within: float) -> NearMi
         return NearMisses.joined([])
     heights, places = faces.heights(face, corners[corner, None])
     near = np.flatnonzero((np.abs(heights[:, 0]) <= within) & (np.abs(places[:, 0]).max(axis=1) < _BESIDE))
-    _, du, dv = faces.derivatives(face[near], *(places[near, :, k] for k in (0, 1)))
+    _, du, dv = faces.derivatives(face[near], places[near, :, 0], places[near, :, 1])
     # Where the lattice goes, a corner of the part stays behind.
     directions = -unit(np.cross(du, dv)[:, 0])
     return NearMisses(heights[near, 0], directions, np.ones(len(near)))

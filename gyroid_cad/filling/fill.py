@@ -25,7 +25,7 @@ from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, withou
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
+from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
@@ -84,8 +84,9 @@ def fill(
         with x, y and z places in the part's space.
     density : number or field, optional
         Volume fraction instead: of the wall, or of the network, for which it is one number.
-    kind : {"sheet", "network-a", "network-b", "channels", "surface"}
-        The wall; one of the two networks it parts; both of them, the wall left out; or the mid-surface alone.
+    kind : {"sheet", "network-a", "network-b", "channels", "bodies", "surface"}
+        The wall; one of the two networks it parts; both of them, the wall left out; the wall, both fluids and the skin,
+        as bodies that share the faces between them; or the mid-surface alone.
     origin, rotation : tuple of float
         Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
         Left out, and if no lattice is given, the origin is (0, 0, 0) or a few hundredths of a cell beside, where edges
@@ -154,7 +155,8 @@ def fill(
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
-    rule = island_rule(keep_islands, drop_islands)
+    # Bodies fill the part: none of them is dropped.
+    rule = island_rule(keep_islands or kind == BODIES, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     require_route(route, deviation=deviation, repair=repair, fillet=fillet)
@@ -184,7 +186,7 @@ def fill(
         with named():
             hollow = _hollow(whole, shell, faces, core)
         inner = whole if hollow is None else hollow.core
-        fillings.append(Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told))
+        fillings.append(Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told, kind == BODIES))
     clear = frame
     if origin is None and lattice is None:
         clear = clear_frame(fillings, frame, size)
@@ -193,7 +195,7 @@ def fill(
             outcome = filling.run(clear)
         outcome = replace(outcome, shift=outcome.shift + clear.origin - frame.origin)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
-        domains, voids = without_specks(domains, filling)
+        domains, voids = (domains, ()) if filling.shared else without_specks(domains, filling)
         made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))
         islands += left
     islands.warn("drop_islands drops")
@@ -243,7 +245,10 @@ def _reported(
         for name, some in domains.items()
     }
     counted = topology(compound_of(shapes.values()))
-    volume = sum(made.volume for some in domains.values() for made in some)
+    # Beside a wall the fluids are no material.
+    fluids = {region.name for region in filling.regions if region.fluid} if filling.shared else set()
+    material = [made for name, some in domains.items() if name not in fluids for made in some]
+    volume = sum(made.volume for made in material)
     walls = [outcome.infill.min_thickness] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
     x, y, z = outcome.shift.tolist()
     report = FillReport(
@@ -259,7 +264,7 @@ def _reported(
         part_volume=filling.part.volume,
         volume=volume,
         density=volume / filling.part.volume,
-        area=sum(made.area for some in domains.values() for made in some),
+        area=sum(made.area for made in material),
         mass=None if grams is None else grams * volume,
         part_mass=None if grams is None else grams * filling.part.volume,
         islands=islands.kept,
@@ -274,5 +279,6 @@ def _reported(
         seconds=dict(filling.seconds),
         cells_alike=outcome.infill.grading.cells_alike,
         uncovered=outcome.infill.uncovered,
+        volumes={name: sum(made.volume for made in some) for name, some in domains.items()},
     )
     return Filled(shapes, report, {name: tuple(made.size for made in some) for name, some in domains.items()})

@@ -97,6 +97,8 @@ class Filling:
     cell_size : float
         In mm.
     progress : callable, optional
+    shared : bool
+        Whether the regions are wanted as bodies that share their faces, the skin too.
     seconds : dict
         By stage.
     """
@@ -107,6 +109,7 @@ class Filling:
     infill_in: Callable[[Frame, Callable[[str], AbstractContextManager[None]]], Infill]
     cell_size: float
     progress: Progress | None
+    shared: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
 
     @cached_property
@@ -166,9 +169,11 @@ class Filling:
             ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
         attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
+        if self.shared:
+            attempts = [("bodies", phase, None) for phase in PERTURBATIONS]
         # A box's sections know nothing of walls where a lattice ends.
         single = self.hollow is None or len(self.part.solids) == 1
-        if self.core.box is not None and single and infill_at(PERTURBATIONS[0]).endless:
+        if self.core.box is not None and single and not self.shared and infill_at(PERTURBATIONS[0]).endless:
             attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
             partial(self._attempt, number, infill_at, phase, points, road, processes)
@@ -239,7 +244,8 @@ class Filling:
         else:
             hits = int(np.sum(infill.contains(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
-        skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
+        apart = self.hollow is None or region.fluid or self.shared
+        skin = 0.0 if apart else self.part.volume - self.core.volume
         sizes = [piece_size(piece) for piece in made]
         if min(sizes, default=0.0) < -_INSIDE_OUT * sum(map(abs, sizes)):
             # Beside another that is too large it would not be seen in their sum.
@@ -254,6 +260,7 @@ class Filling:
 
     def _require_simple(self, shapes: Iterable[KernelShape]) -> None:
 
+        # One by one: bodies that share a face have its edges four times.
         everything = compound_of(shapes)
         counted, valid = topology(everything), is_valid(everything)
         closed = counted.closed or all(region.surface for region in self.regions)

@@ -11,22 +11,25 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.TopAbs import TopAbs_FACE
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
-from gyroid_cad.filling.wanted import Region
+from gyroid_cad.filling.wanted import SKIN, Region
 from gyroid_cad.kernel.boundary import ReadBoundary
-from gyroid_cad.kernel.check import measure
+from gyroid_cad.kernel.check import measure, parts_of
+from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.crossed import FaceSizes, crossed_pieces
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.shells import VolumeOf, connected_shells
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import Pieces, bounded_solids
+from gyroid_cad.kernel.split import Pieces, bounded_solids, parted_solids
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.crossing import cross_part
@@ -38,7 +41,7 @@ __all__ = ["Job", "Made", "Road", "taken"]
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
-Road = Literal["sections", "crossings", "booleans"]
+Road = Literal["sections", "crossings", "booleans", "bodies"]
 # Solids by the name of their region; patches that the part's boundary may cross; and those that lie wholly inside.
 Found = tuple[dict[str, list["Made"]], int, int]
 
@@ -86,8 +89,9 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
 
     Parameters
     ----------
-    road : {"sections", "crossings", "booleans"}
-        Sections are of a box alone, and of endless lattices, for they cut no side walls.
+    road : {"sections", "crossings", "booleans", "bodies"}
+        Sections are of a box alone, and of endless lattices, for they cut no side walls. Bodies are those of crossings
+        with the first region, and what it leaves.
     job : Job
     infill : Infill
     processes : int, optional
@@ -99,9 +103,9 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
     """
     if road == "sections":
         return _by_sections(job, infill)
-    if road == "crossings":
+    if road in ("crossings", "bodies"):
         try:
-            return _by_crossings(job, infill)
+            return _by_crossings(job, infill, road == "bodies")
         except np.linalg.LinAlgError as singular:
             raise KernelError("an edge of the part lies along the lattice") from singular
     return _by_booleans(job, infill, processes)
@@ -151,18 +155,89 @@ def _patches_of(left: TrimmedWall) -> tuple[int, int]:
     return len(cut), len({face.patch for face in left.faces} - cut)
 
 
-def _by_crossings(job: Job, infill: Infill) -> Found:
+def _by_crossings(job: Job, infill: Infill, bodies: bool) -> Found:
     """Fill any part: the curves in which the lattice crosses its boundary are found by number."""
     with job.timed("cover"):
         sides, read = job.sides(infill), job.boundary
     crossing, inside = (np.flatnonzero(sides == side) for side in (CROSSING, INSIDE))
-    made = {region.name: _crossed(job, infill, region, read, crossing, inside) for region in job.regions}
+    if bodies:
+        made = _bodies(job, infill, _crossed(job, infill, job.regions[0], read, crossing, inside, outer=True))
+    else:
+        made = {
+            region.name: _joined_crossed(
+                job, infill, region, _crossed(job, infill, region, read, crossing, inside, job.hollow is not None)
+            )
+            for region in job.regions
+        }
     return made, len(crossing), len(inside)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Crossed:
+    """Pieces of the core's boundary and of the lattice's faces, faces that nothing cut, and how large they are.
+
+    ``sides`` are those of the wall, 0 or 1, of the pieces of the lattice's faces and then of the faces.
+    """
+
+    pieces: Pieces
+    faces: list[TopoDS_Face]
+    sizes: FaceSizes
+    sides: list[int]
+
+
+def _bodies(job: Job, infill: Infill, crossed: _Crossed) -> dict[str, list[Made]]:
+    """The first region, what it leaves on either side of it, and the skin, as bodies that share their faces."""
+    wall, *fluids = job.regions
+    pieces, faces, sizes = crossed.pieces, crossed.faces, crossed.sizes
+
+    def volume_of(shell: TopoDS_Shape) -> float:
+        return sizes.of(shell).volume
+
+    with job.timed("join"):
+        within, beside = parted_solids(
+            pieces, faces, lambda point: bool(infill.contains(wall, point[np.newaxis])[0]), volume_of
+        )
+        found: dict[str, list[KernelShape]] = {wall.name: list(within), **{fluid.name: [] for fluid in fluids}}
+        numbered = NumberedShapes()
+        for face in [*pieces.inside, *faces]:
+            numbered.Add(face)
+        names = {side: fluid.name for fluid in fluids for side, _ in fluid.sides}
+        for solid in beside:
+            numbers = (numbered.FindIndex(face) for face in parts_of(solid, TopAbs_FACE))
+            number = next(filter(None, numbers), None)
+            if number is None:
+                raise KernelError("a piece of the part meets no wall, so that it belongs to neither fluid")
+            found[names[crossed.sides[number - 1]]].append(solid)
+        if job.hollow is not None:
+            found[SKIN] = list(job.hollow.skin_solids(pieces, volume_of))
+    return {
+        name: [Made(shape, size.volume, size.area, size.centroid) for shape, size in ((one, sizes.of(one)) for one in some)]
+        for name, some in found.items()
+    }
+
+
+def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: _Crossed) -> list[Made]:
+    sizes = crossed.sizes
+    with job.timed("join"):
+        shapes = _joined(
+            job, infill, region, crossed.pieces, crossed.faces, lambda shell: sizes.of(shell).volume
+        )
+        made = [(shape, sizes.of(shape)) for shape in shapes]
+    return [
+        Made(shape, 0.0, size.area) if region.surface else Made(shape, size.volume, size.area, size.centroid)
+        for shape, size in made
+    ]
+
+
 def _crossed(
-    job: Job, infill: Infill, region: Region, read: ReadBoundary, crossing: NDArray[np.int64], inside: NDArray[np.int64]
-) -> list[Made]:
+    job: Job,
+    infill: Infill,
+    region: Region,
+    read: ReadBoundary,
+    crossing: NDArray[np.int64],
+    inside: NDArray[np.int64],
+    outer: bool,
+) -> _Crossed:
     def in_region(points: Floats) -> Booleans:
         return infill.contains(region, points)
 
@@ -173,7 +248,7 @@ def _crossed(
             job.cell_size,
             job.core.contains,
             None if region.surface else in_region,
-            outer=job.hollow is not None,
+            outer=outer,
             progress=lambda done, count: report_progress(job.progress, "cut", done, count),
         )
     whole = infill.bounding(region, inside)
@@ -191,13 +266,8 @@ def _crossed(
             pieces, faces = crossed_pieces(cut, read, *whole)
         with job.timed("measure"):
             sizes = FaceSizes([*pieces.inside, *pieces.boundary, *faces], measures(), middle)
-    with job.timed("join"):
-        shapes = _joined(job, infill, region, pieces, faces, lambda shell: sizes.of(shell).volume)
-        made = [(shape, sizes.of(shape)) for shape in shapes]
-    return [
-        Made(shape, 0.0, size.area) if region.surface else Made(shape, size.volume, size.area, size.centroid)
-        for shape, size in made
-    ]
+    sides = [*cut.faces.side[[piece.face for piece in cut.lattice]].tolist(), *whole[0].side.tolist()]
+    return _Crossed(pieces, faces, sizes, sides)
 
 
 def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:

@@ -55,7 +55,7 @@ from gyroid_cad.step.header import StepHeader
 __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
-SURFACE = KINDS[-1]
+BODIES, SURFACE = KINDS[-2:]
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
     *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
@@ -218,6 +218,8 @@ def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
     """
     formats = {format_of(path) for path in output}
     route: Route = given["route"] or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
+    if given["kind"] == BODIES:
+        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
     if route == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         return route

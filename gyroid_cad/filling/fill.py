@@ -155,7 +155,8 @@ def fill(
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
-    # Bodies fill the part: none of them is dropped.
+    if drop_islands and kind == BODIES:
+        raise ParameterError("drop_islands", drop_islands, "none of bodies, which fill the part together")
     rule = island_rule(keep_islands or kind == BODIES, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
@@ -164,6 +165,8 @@ def fill(
     regions, size, settings, foreseen, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
+    if route == TRIANGLES and kind == BODIES:
+        raise ParameterError("kind", kind, "another at the route of triangles: bodies share exact faces")
     if route == TRIANGLES:
         cover = functools.partial(require_cover, cell_size=size, control_points=settings.control_points)
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
@@ -186,7 +189,9 @@ def fill(
         with named():
             hollow = _hollow(whole, shell, faces, core)
         inner = whole if hollow is None else hollow.core
-        fillings.append(Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told, kind == BODIES))
+        fillings.append(
+            Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told, kind == BODIES)
+        )
     clear = frame
     if origin is None and lattice is None:
         clear = clear_frame(fillings, frame, size)
@@ -198,7 +203,7 @@ def fill(
         domains, voids = (domains, ()) if filling.shared else without_specks(domains, filling)
         made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))
         islands += left
-    islands.warn("drop_islands drops")
+    islands.warn("" if kind == BODIES else "drop_islands drops")
     together = _together(made, remarks)
     warn_of_voids(together.report.voids)
     warn_of_uncovered(together.report.uncovered)
@@ -220,12 +225,13 @@ def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
     """Bodies that were filled each by itself, as one."""
     report = joint_report([one.report for one in filled], remarks)
     if len(filled) == 1:
-        return Filled(filled[0].domains, report, filled[0].sizes)
+        return replace(filled[0], report=report)
     names = dict.fromkeys(name for one in filled for name in one.domains)
     return Filled(
         {name: compound_of(one.domains[name] for one in filled if name in one.domains) for name in names},
         report,
         {name: tuple(size for one in filled for size in one.sizes.get(name, ())) for name in names},
+        {name: tuple(called for one in filled for called in one.face_names.get(name, ())) for name in names},
     )
 
 
@@ -281,4 +287,6 @@ def _reported(
         uncovered=outcome.infill.uncovered,
         volumes={name: sum(made.volume for made in some) for name, some in domains.items()},
     )
-    return Filled(shapes, report, {name: tuple(made.size for made in some) for name, some in domains.items()})
+    sizes = {name: tuple(made.size for made in some) for name, some in domains.items()}
+    face_names = {name: tuple(called for made in some for called in made.face_names) for name, some in domains.items()}
+    return Filled(shapes, report, sizes, face_names)

@@ -19,7 +19,7 @@ from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
-from gyroid_cad.filling.wanted import SKIN, Region
+from gyroid_cad.filling.wanted import SKIN, WALL, Region
 from gyroid_cad.kernel.boundary import ReadBoundary
 from gyroid_cad.kernel.check import measure, parts_of
 from gyroid_cad.kernel.compat import NumberedShapes
@@ -50,13 +50,15 @@ Found = tuple[dict[str, list["Made"]], int, int]
 class Made:
     """A solid, or a shell of the bare surface, with its volume in mm3, its area in mm2, and its centroid in mm.
 
-    There is no centroid where the kernel measured some of it, which is not as exact.
+    There is no centroid where the kernel measured some of it, which is not as exact. Names of its faces, if it has any,
+    are in the order in which the kernel counts them.
     """
 
     shape: KernelShape
     volume: float
     area: float
     centroid: Point | None = None
+    face_names: tuple[str, ...] = ()
 
     @property
     def size(self) -> ShapeSize:
@@ -198,30 +200,60 @@ def _bodies(job: Job, infill: Infill, crossed: _Crossed) -> dict[str, list[Made]
             pieces, faces, lambda point: bool(infill.contains(wall, point[np.newaxis])[0]), volume_of
         )
         found: dict[str, list[KernelShape]] = {wall.name: list(within), **{fluid.name: [] for fluid in fluids}}
-        numbered = NumberedShapes()
-        for face in [*pieces.inside, *faces]:
-            numbered.Add(face)
-        names = {side: fluid.name for fluid in fluids for side, _ in fluid.sides}
+        named = _FaceNames(crossed, job.hollow, {side: fluid.name for fluid in fluids for side, _ in fluid.sides})
         for solid in beside:
-            numbers = (numbered.FindIndex(face) for face in parts_of(solid, TopAbs_FACE))
-            number = next(filter(None, numbers), None)
-            if number is None:
-                raise KernelError("a piece of the part meets no wall, so that it belongs to neither fluid")
-            found[names[crossed.sides[number - 1]]].append(solid)
+            found[named.fluid_of(solid)].append(solid)
         if job.hollow is not None:
             found[SKIN] = list(job.hollow.skin_solids(pieces, volume_of))
     return {
-        name: [Made(shape, size.volume, size.area, size.centroid) for shape, size in ((one, sizes.of(one)) for one in some)]
-        for name, some in found.items()
+        name: [_made(shape, sizes.of(shape), named.of(shape, name)) for shape in some] for name, some in found.items()
     }
+
+
+def _made(shape: KernelShape, size: ShapeSize, names: tuple[str, ...]) -> Made:
+    return Made(shape, size.volume, size.area, size.centroid, names)
+
+
+class _FaceNames:
+    """Names of the faces of bodies, by what is on their other side: a face that two of them share has one."""
+
+    def __init__(self, crossed: _Crossed, hollow: Hollow | None, fluids: dict[int, str]) -> None:
+        self._numbers, self._hollow, self._fluids = NumberedShapes(), hollow, fluids
+        self._sides, self._origins = crossed.sides, crossed.pieces.origins
+        for face in [*crossed.pieces.inside, *crossed.faces, *crossed.pieces.boundary]:
+            self._numbers.Add(face)
+
+    def fluid_of(self, solid: KernelShape) -> str:
+        """Name of the fluid that a solid beside the wall is."""
+        numbers = (self._numbers.FindIndex(face) for face in parts_of(solid, TopAbs_FACE))
+        side = next((self._sides[number - 1] for number in numbers if 0 < number <= len(self._sides)), None)
+        if side is None:
+            raise KernelError("a piece of the part meets no wall, so that it belongs to neither fluid")
+        return self._fluids[side]
+
+    def of(self, solid: KernelShape, body: str) -> tuple[str, ...]:
+        """Names of the faces of a body, in the order in which the kernel counts them."""
+        return tuple(self._name(int(self._numbers.FindIndex(face)) - 1, body) for face in parts_of(solid, TopAbs_FACE))
+
+    def _name(self, number: int, body: str) -> str:
+        if number < 0:
+            return f"{SKIN}/outside"
+        if number < len(self._sides):
+            return f"{WALL}/{self._fluids[self._sides[number]][-1]}"
+        origin = self._origins[number - len(self._sides)]
+        if self._hollow is None:
+            return f"{body}/face {origin + 1}"
+        return (
+            f"{body}/opening {sum(self._hollow.opened[: origin + 1])}"
+            if self._hollow.opened[origin]
+            else f"{SKIN}/inside"
+        )
 
 
 def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: _Crossed) -> list[Made]:
     sizes = crossed.sizes
     with job.timed("join"):
-        shapes = _joined(
-            job, infill, region, crossed.pieces, crossed.faces, lambda shell: sizes.of(shell).volume
-        )
+        shapes = _joined(job, infill, region, crossed.pieces, crossed.faces, lambda shell: sizes.of(shell).volume)
         made = [(shape, sizes.of(shape)) for shape in shapes]
     return [
         Made(shape, 0.0, size.area) if region.surface else Made(shape, size.volume, size.area, size.centroid)

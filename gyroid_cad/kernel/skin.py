@@ -100,7 +100,6 @@ class Hollow:
         ]
         return solids_of([*self._skin_faces(pieces), *pieces.inside, *map(as_face, whole), *ends], volume_of)
 
-
     def skin_solids(self, pieces: Pieces, volume_of: VolumeOf | None = None) -> list[TopoDS_Solid]:
         """The skin alone, which shares pieces of the core's boundary with what is in the core.
 

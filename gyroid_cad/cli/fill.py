@@ -107,8 +107,8 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "--opening",
     multiple=True,
     metavar="FACE",
-    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; "
-    "may be repeated.",
+    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; of "
+    "bodies for one fluid, as a:>Z or b:<X; may be repeated.",
 )
 @click.option(
     "--core",
@@ -270,9 +270,11 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
 
 
-def _face(opening: str) -> str | list[float]:
-    """A selector as it stands, or the coordinates of a point."""
+def _face(opening: str) -> str | list[float] | tuple[str, list[float]]:
+    """A selector as it stands, or the coordinates of a point, with the fluid that it may name."""
+    fluid, colon, place = opening.rpartition(":")
     try:
-        return [float(number) for number in opening.split(",")]
+        point = [float(number) for number in place.split(",")]
     except ValueError:
         return opening
+    return (fluid, point) if colon else point

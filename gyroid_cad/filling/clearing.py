@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.filling.part import Filling
+from gyroid_cad.filling.part import FilledBy
 from gyroid_cad.trim.clearance import NearMisses, clear_shift
 from gyroid_cad.wall.covering import Frame
 
@@ -24,12 +24,12 @@ _FURTHEST, _ROUNDS = 0.04, 3
 _WORTHWHILE = 0.5
 
 
-def clear_frame(fillings: Sequence[Filling], frame: Frame, cell_size: float) -> Frame:
+def clear_frame(fillings: Sequence[FilledBy], frame: Frame, cell_size: float) -> Frame:
     """Move a lattice by a few hundredths of a cell, where that leaves none or fewer of the edges that are too short.
 
     Parameters
     ----------
-    fillings : sequence of Filling
+    fillings : sequence of FilledBy
         All with the same lattice.
     frame : Frame
         Where it stands.

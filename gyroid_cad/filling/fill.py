@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Face
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, Route, SurfaceName
@@ -20,15 +21,16 @@ from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
 from gyroid_cad.filling.forecast import require_cover
-from gyroid_cad.filling.infill import described_infill
-from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_specks
+from gyroid_cad.filling.infill import Foreseen, InfillIn, described_infill
+from gyroid_cad.filling.part import FilledBy, Filling, Outcome, bodies_of, part_of, without_specks
+from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, open_faces, require_of_bodies
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
+from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part
-from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
+from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import surface_named
@@ -104,7 +106,8 @@ def fill(
         Thickness in mm of a solid shell kept from the part and fused with the infill; channels end at it.
     openings : sequence
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
-        the faces furthest that way, or points (x, y, z), each for the face next to it.
+        the faces furthest that way, or points (x, y, z), each for the face next to it. Of bodies each may name the fluid
+        it is for, as in "a:>Z" or ("a", face): the channels of the other end at the skin there.
     core : shape, Workplane or path-like, optional
         Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
         core, open wherever the core comes to the part's boundary.
@@ -155,8 +158,7 @@ def fill(
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
-    if drop_islands and kind == BODIES:
-        raise ParameterError("drop_islands", drop_islands, "none of bodies, which fill the part together")
+    require_of_bodies(kind, openings, drop_islands, route)
     rule = island_rule(keep_islands or kind == BODIES, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
@@ -165,8 +167,6 @@ def fill(
     regions, size, settings, foreseen, infill_in = described_infill(
         kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
     )
-    if route == TRIANGLES and kind == BODIES:
-        raise ParameterError("kind", kind, "another at the route of triangles: bodies share exact faces")
     if route == TRIANGLES:
         cover = functools.partial(require_cover, cell_size=size, control_points=settings.control_points)
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
@@ -180,18 +180,14 @@ def fill(
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
         warn_caller(remark, PartWarning)
-    fillings, made, islands = [], [], Islands()
     naming = [functools.partial(naming_triangles, kind, name if len(parts) > 1 else "") for name, _ in parts]
-    for (name, whole), faces, named in zip(parts, opened_faces(parts, openings), naming, strict=True):
-        told = progress if len(parts) == 1 else named_progress(progress, name)
-        forecast = foreseen(whole)
-        report_progress(told, str(forecast), 0, round(forecast.seconds))
+    wanted = _Wanted(kind, regions, size, shell, core, infill_in, foreseen)
+    fillings, made, islands = [], [], Islands()
+    for (name, whole), faces, named in zip(parts, open_faces(parts, openings), naming, strict=True):
         with named():
-            hollow = _hollow(whole, shell, faces, core)
-        inner = whole if hollow is None else hollow.core
-        fillings.append(
-            Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told, kind == BODIES)
-        )
+            fillings.append(
+                wanted.filling(whole, faces, progress if len(parts) == 1 else named_progress(progress, name))
+            )
     clear = frame
     if origin is None and lattice is None:
         clear = clear_frame(fillings, frame, size)
@@ -200,7 +196,9 @@ def fill(
             outcome = filling.run(clear)
         outcome = replace(outcome, shift=outcome.shift + clear.origin - frame.origin)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
-        domains, voids = (domains, ()) if filling.shared else without_specks(domains, filling)
+        voids: tuple[SealedVoid, ...] = ()
+        if kind != BODIES:
+            domains, voids = without_specks(domains, filling)
         made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))
         islands += left
     islands.warn("" if kind == BODIES else "drop_islands drops")
@@ -208,6 +206,34 @@ def fill(
     warn_of_voids(together.report.voids)
     warn_of_uncovered(together.report.uncovered)
     return together
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wanted:
+    """What every solid of a part is filled with."""
+
+    kind: Kind
+    regions: tuple[Region, ...]
+    cell_size: float
+    skin: float | None
+    core: Any
+    infill_in: InfillIn
+    foreseen: Foreseen
+
+    def filling(self, part: Part, opened: OpenFaces, progress: Progress | None) -> Filling | PortedFilling:
+        """The filling of a solid, once what it takes has been said."""
+        forecast = self.foreseen(part)
+        report_progress(progress, str(forecast), 0, round(forecast.seconds))
+        fillings = {fluid: self._one(part, fluid, faces, progress) for fluid, faces in opened.items()}
+        return fillings[ANY] if ANY in fillings else PortedFilling(fillings)
+
+    def _one(self, part: Part, fluid: str, opened: Sequence[TopoDS_Face], progress: Progress | None) -> Filling:
+        hollow = _hollow(part, self.skin, opened, self.core)
+        inner = part if hollow is None else hollow.core
+        regions = self.regions if fluid == ANY else tuple(one for one in self.regions if one.name == fluid)
+        shared = self.kind == BODIES and fluid == ANY
+        infill = functools.partial(self.infill_in, inner)
+        return Filling(part, hollow, regions, infill, self.cell_size, progress, shared, tuple(opened))
 
 
 def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) -> Hollow | None:
@@ -236,7 +262,7 @@ def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
 
 
 def _reported(
-    filling: Filling,
+    filling: FilledBy,
     outcome: Outcome,
     islands: Islands,
     voids: tuple[SealedVoid, ...],
@@ -252,7 +278,7 @@ def _reported(
     }
     counted = topology(compound_of(shapes.values()))
     # Beside a wall the fluids are no material.
-    fluids = {region.name for region in filling.regions if region.fluid} if filling.shared else set()
+    fluids = {region.name for region in filling.regions if region.fluid} if kind == BODIES else set()
     material = [made for name, some in domains.items() if name not in fluids for made in some]
     volume = sum(made.volume for made in material)
     walls = [outcome.infill.min_thickness] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.TopoDS import TopoDS_Face
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
@@ -34,6 +35,7 @@ from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.wall.covering import CROSSING, PERTURBATIONS, Frame, first_success
 
 __all__ = [
+    "FilledBy",
     "Filling",
     "Made",
     "Outcome",
@@ -82,6 +84,22 @@ class Outcome:
     by_sections: bool
 
 
+class FilledBy(Protocol):
+    """What is known of a part that was filled, beside what came out."""
+
+    @property
+    def part(self) -> Part: ...
+    @property
+    def hollow(self) -> Hollow | None: ...
+    @property
+    def regions(self) -> tuple[Region, ...]: ...
+    @property
+    def cell_size(self) -> float: ...
+    @property
+    def seconds(self) -> dict[str, float]: ...
+    def near_misses(self, frame: Frame, within: float) -> NearMisses: ...
+
+
 @dataclass(frozen=True, eq=False)
 class Filling:
     """A part to be filled: all that stays the same however the lattice is shifted.
@@ -99,6 +117,8 @@ class Filling:
     progress : callable, optional
     shared : bool
         Whether the regions are wanted as bodies that share their faces, the skin too.
+    opened : tuple of TopoDS_Face
+        The part's faces where its skin is open.
     seconds : dict
         By stage.
     """
@@ -110,6 +130,7 @@ class Filling:
     cell_size: float
     progress: Progress | None
     shared: bool = False
+    opened: tuple[TopoDS_Face, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
 
     @cached_property
@@ -270,7 +291,7 @@ class Filling:
 
 
 def without_specks(
-    domains: dict[str, list[Made]], filling: Filling
+    domains: dict[str, list[Made]], filling: FilledBy
 ) -> tuple[dict[str, list[Made]], tuple[SealedVoid, ...]]:
     """Return the solids of every domain without specks of void, and the voids that they enclose, the largest first.
 

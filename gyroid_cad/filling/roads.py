@@ -37,9 +37,10 @@ from gyroid_cad.trim.measures import PieceMeasures, boundary_measures, joined, l
 from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
-__all__ = ["Job", "Made", "Road", "taken"]
+__all__ = ["Crossed", "Job", "Made", "Road", "crossed_by", "patches_of", "taken"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 Road = Literal["sections", "crossings", "booleans", "bodies"]
 # Solids by the name of their region; patches that the part's boundary may cross; and those that lie wholly inside.
@@ -159,38 +160,60 @@ def _patches_of(left: TrimmedWall) -> tuple[int, int]:
 
 def _by_crossings(job: Job, infill: Infill, bodies: bool) -> Found:
     """Fill any part: the curves in which the lattice crosses its boundary are found by number."""
-    with job.timed("cover"):
-        sides, read = job.sides(infill), job.boundary
-    crossing, inside = (np.flatnonzero(sides == side) for side in (CROSSING, INSIDE))
+    crossing, inside = patches_of(job, infill)
     if bodies:
-        made = _bodies(job, infill, _crossed(job, infill, job.regions[0], read, crossing, inside, outer=True))
+        made = _bodies(job, infill, crossed_by(job, infill, job.regions[0], crossing, inside, outer=True))
     else:
         made = {
             region.name: _joined_crossed(
-                job, infill, region, _crossed(job, infill, region, read, crossing, inside, job.hollow is not None)
+                job, infill, region, crossed_by(job, infill, region, crossing, inside, job.hollow is not None)
             )
             for region in job.regions
         }
     return made, len(crossing), len(inside)
 
 
+def patches_of(job: Job, infill: Infill) -> tuple[Integers, Integers]:
+    """Patches that the boundary of what is filled may cross, and those that lie wholly inside."""
+    with job.timed("cover"):
+        sides = job.sides(infill)
+    return np.flatnonzero(sides == CROSSING), np.flatnonzero(sides == INSIDE)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class _Crossed:
+class Crossed:
     """Pieces of the core's boundary and of the lattice's faces, faces that nothing cut, and how large they are.
 
-    ``sides`` are those of the wall, 0 or 1, of the pieces of the lattice's faces and then of the faces.
+    Attributes
+    ----------
+    pieces : Pieces
+    faces : list of TopoDS_Face
+        Uncut.
+    measures : PieceMeasures
+        Of the pieces of the lattice's faces, of those of the boundary, and of the uncut faces.
+    middle : ndarray, shape (3,)
+        That they are taken about.
+    sides : list of int
+        Of the wall, 0 or 1: on which the pieces of the lattice's faces are, and then the uncut faces.
     """
 
     pieces: Pieces
     faces: list[TopoDS_Face]
-    sizes: FaceSizes
+    measures: PieceMeasures
+    middle: Floats
     sides: list[int]
 
+    @property
+    def measured(self) -> list[TopoDS_Face]:
+        """Faces in the order of their measures."""
+        return [*self.pieces.inside, *self.pieces.boundary, *self.faces]
 
-def _bodies(job: Job, infill: Infill, crossed: _Crossed) -> dict[str, list[Made]]:
+
+def _bodies(job: Job, infill: Infill, crossed: Crossed) -> dict[str, list[Made]]:
     """The first region, what it leaves on either side of it, and the skin, as bodies that share their faces."""
     wall, *fluids = job.regions
-    pieces, faces, sizes = crossed.pieces, crossed.faces, crossed.sizes
+    pieces, faces = crossed.pieces, crossed.faces
+    sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
 
     def volume_of(shell: TopoDS_Shape) -> float:
         return sizes.of(shell).volume
@@ -217,7 +240,7 @@ def _made(shape: KernelShape, size: ShapeSize, names: tuple[str, ...]) -> Made:
 class _FaceNames:
     """Names of the faces of bodies, by what is on their other side: a face that two of them share has one."""
 
-    def __init__(self, crossed: _Crossed, hollow: Hollow | None, fluids: dict[int, str]) -> None:
+    def __init__(self, crossed: Crossed, hollow: Hollow | None, fluids: dict[int, str]) -> None:
         self._numbers, self._hollow, self._fluids = NumberedShapes(), hollow, fluids
         self._sides, self._origins = crossed.sides, crossed.pieces.origins
         for face in [*crossed.pieces.inside, *crossed.faces, *crossed.pieces.boundary]:
@@ -250,8 +273,8 @@ class _FaceNames:
         )
 
 
-def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: _Crossed) -> list[Made]:
-    sizes = crossed.sizes
+def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: Crossed) -> list[Made]:
+    sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
     with job.timed("join"):
         shapes = _joined(job, infill, region, crossed.pieces, crossed.faces, lambda shell: sizes.of(shell).volume)
         made = [(shape, sizes.of(shape)) for shape in shapes]
@@ -261,22 +284,38 @@ def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: _Crossed)
     ]
 
 
-def _crossed(
+def crossed_by(
     job: Job,
     infill: Infill,
     region: Region,
-    read: ReadBoundary,
-    crossing: NDArray[np.int64],
-    inside: NDArray[np.int64],
+    crossing: Integers,
+    inside: Integers,
     outer: bool,
-) -> _Crossed:
+) -> Crossed:
+    """Cross what bounds a region with the boundary of what is filled.
+
+    Parameters
+    ----------
+    job : Job
+    infill : Infill
+    region : Region
+    crossing, inside : ndarray of int
+        As of :func:`patches_of`.
+    outer : bool
+        Whether pieces of the boundary beside the region are wanted too.
+
+    Raises
+    ------
+    KernelError
+    """
+
     def in_region(points: Floats) -> Booleans:
         return infill.contains(region, points)
 
     with job.timed("cut"):
         cut = cross_part(
             *infill.bounding(region, crossing),
-            read.boundary,
+            job.boundary.boundary,
             job.cell_size,
             job.core.contains,
             None if region.surface else in_region,
@@ -295,11 +334,11 @@ def _crossed(
 
     with beside(measured, "measures the faces") as measures:
         with job.timed("solid"):
-            pieces, faces = crossed_pieces(cut, read, *whole)
+            pieces, faces = crossed_pieces(cut, job.boundary, *whole)
         with job.timed("measure"):
-            sizes = FaceSizes([*pieces.inside, *pieces.boundary, *faces], measures(), middle)
+            found = measures()
     sides = [*cut.faces.side[[piece.face for piece in cut.lattice]].tolist(), *whole[0].side.tolist()]
-    return _Crossed(pieces, faces, sizes, sides)
+    return Crossed(pieces, faces, found, middle, sides)
 
 
 def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:

@@ -98,7 +98,7 @@ class Hollow:
             for piece, origin, inner in boundary
             if inner == self.opened[origin]
         ]
-        return solids_of([*self._skin_faces(pieces), *pieces.inside, *map(as_face, whole), *ends], volume_of)
+        return solids_of([*self.skin_faces(pieces), *pieces.inside, *map(as_face, whole), *ends], volume_of)
 
     def skin_solids(self, pieces: Pieces, volume_of: VolumeOf | None = None) -> list[TopoDS_Solid]:
         """The skin alone, which shares pieces of the core's boundary with what is in the core.
@@ -120,9 +120,10 @@ class Hollow:
             for piece, origin in zip(pieces.boundary, pieces.origins, strict=True)
             if not self.opened[origin]
         ]
-        return solids_of([*self._skin_faces(pieces), *inner], volume_of)
+        return solids_of([*self.skin_faces(pieces), *inner], volume_of)
 
-    def _skin_faces(self, pieces: Pieces) -> Sequence[TopoDS_Face]:
+    def skin_faces(self, pieces: Pieces) -> Sequence[TopoDS_Face]:
+        """Faces of the skin that it does not share with the core, with their edges as the core's have been split."""
         return with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
 
 

@@ -87,3 +87,39 @@ def test_bodies_are_refused_what_they_cannot_be(tmp_path: Path) -> None:
         fill(ball(), CELL, density=0.3, kind="bodies", route="triangles")
     with pytest.raises(ParameterError, match="fill the part together"):
         fill(ball(), CELL, density=0.3, kind="bodies", drop_islands=True)
+
+
+def test_where_one_fluid_flows_in_the_channels_of_the_other_are_closed() -> None:
+    part = cq.Workplane().box(9, 8, 6)
+    made = bodies_of(part, skin=0.7, openings=["a:<X", "a:>X", "b:<Y", ("b", (0.0, 4.0, 0.0))])
+    assert sum(made.report.volumes.values()) == pytest.approx(made.report.part_volume, rel=1e-9)
+    for name, axis, size in (("fluid-a", 0, 9), ("fluid-b", 1, 8)):
+        boxes = [
+            cq.Face(face).BoundingBox()
+            for face, called in zip(parts_of(made.domains[name], TopAbs_FACE), made.face_names[name], strict=True)
+            if called.startswith(f"{name[-1]}:")
+        ]
+        ends = {(round((box.xmin, box.ymin)[axis], 6), round((box.xmax, box.ymax)[axis], 6)) for box in boxes}
+        assert ends == {(-size / 2, -size / 2), (size / 2, size / 2)}
+        # The other way it ends at the skin.
+        other = part.faces(("<Y", "<X")[axis]).val()
+        assert other.distance(cq.Shape.cast(made.domains[name])) == pytest.approx(0.7, abs=1e-6)
+    # By the kernel's own integrals, which know nothing of ours.
+    wall = cq.Shape.cast(made.domains["wall"])
+    assert wall.isValid()
+    assert wall.Volume() == pytest.approx(made.report.volume, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("openings", "message"),
+    [
+        (["a:>X", ">Y"], "a fluid as well"),
+        (["a:>X"], "one for fluid b too"),
+        (["a:>X", "b:>X"], "each face open for one fluid"),
+    ],
+)
+def test_openings_for_fluids_are_refused_where_they_contradict(openings: list[str], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        bodies_of(ball() if len(openings) == 1 else cq.Workplane().box(9, 8, 6), skin=0.7, openings=openings)
+    with pytest.raises(ParameterError, match="unless kind is"):
+        fill(ball(), CELL, density=0.3, skin=0.7, openings=["a:>X", "b:<X"])

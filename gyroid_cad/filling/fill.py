@@ -106,8 +106,8 @@ def fill(
         Thickness in mm of a solid shell kept from the part and fused with the infill; channels end at it.
     openings : sequence
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
-        the faces furthest that way, or points (x, y, z), each for the face next to it. Of bodies each may name the fluid
-        it is for, as in "a:>Z" or ("a", face): the channels of the other end at the skin there.
+        the faces furthest that way, or points (x, y, z), each for the face next to it. Of bodies each may name the
+        fluid it is for, as in "a:>Z" or ("a", face): the channels of the other end at the skin there.
     core : shape, Workplane or path-like, optional
         Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
         core, open wherever the core comes to the part's boundary.

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.TopoDS import TopoDS_Face
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.clearing import clear_frame
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
@@ -32,9 +30,11 @@ from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
+from gyroid_cad.kernel.solid import KernelFace
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.parameters import valid_tolerance
@@ -190,7 +190,10 @@ def fill(
             )
     clear = frame
     if origin is None and lattice is None:
-        clear = clear_frame(fillings, frame, size)
+        every = tuple(fillings)
+        clear = clear_frame(
+            lambda place, within: NearMisses.joined([one.near_misses(place, within) for one in every]), frame, size
+        )
     for filling, named in zip(fillings, naming, strict=True):
         with named():
             outcome = filling.run(clear)
@@ -210,7 +213,7 @@ def fill(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wanted:
-    """What every solid of a part is filled with."""
+    """Lattice, skin and core that every solid of a part is filled with."""
 
     kind: Kind
     regions: tuple[Region, ...]
@@ -227,7 +230,7 @@ class _Wanted:
         fillings = {fluid: self._one(part, fluid, faces, progress) for fluid, faces in opened.items()}
         return fillings[ANY] if ANY in fillings else PortedFilling(fillings)
 
-    def _one(self, part: Part, fluid: str, opened: Sequence[TopoDS_Face], progress: Progress | None) -> Filling:
+    def _one(self, part: Part, fluid: str, opened: Sequence[KernelFace], progress: Progress | None) -> Filling:
         hollow = _hollow(part, self.skin, opened, self.core)
         inner = part if hollow is None else hollow.core
         regions = self.regions if fluid == ANY else tuple(one for one in self.regions if one.name == fluid)

@@ -11,7 +11,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.TopoDS import TopoDS_Face
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
@@ -28,7 +27,7 @@ from gyroid_cad.kernel.check import compound_of, is_valid, measure, sealed_shell
 from gyroid_cad.kernel.part import Part, require_part, sound_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
-from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.solid import KernelFace, KernelShape
 from gyroid_cad.trim.clearance import NearMisses, near_misses
 from gyroid_cad.trim.islands import SealedVoid, piece_size, speck_below
 from gyroid_cad.trim.lattice_faces import LatticeFaces
@@ -85,7 +84,7 @@ class Outcome:
 
 
 class FilledBy(Protocol):
-    """What is known of a part that was filled, beside what came out."""
+    """Part that was filled, with what, and how long it took."""
 
     @property
     def part(self) -> Part: ...
@@ -117,7 +116,7 @@ class Filling:
     progress : callable, optional
     shared : bool
         Whether the regions are wanted as bodies that share their faces, the skin too.
-    opened : tuple of TopoDS_Face
+    opened : tuple of KernelFace
         The part's faces where its skin is open.
     seconds : dict
         By stage.
@@ -130,7 +129,7 @@ class Filling:
     cell_size: float
     progress: Progress | None
     shared: bool = False
-    opened: tuple[TopoDS_Face, ...] = ()
+    opened: tuple[KernelFace, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
 
     @cached_property

@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.TopAbs import TopAbs_FACE
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import ROUTES, Kind, Route
@@ -23,12 +21,13 @@ from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.roads import Crossed, Made, crossed_by, patches_of
 from gyroid_cad.filling.wanted import BODIES, FLUID_A, FLUID_B, SKIN, WALL, Region
-from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.check import faces_of, is_valid, topology
 from gyroid_cad.kernel.compat import NumberedShapes, as_face
 from gyroid_cad.kernel.crossed import FaceSizes
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.shells import solids_of
 from gyroid_cad.kernel.skin import Hollow, opened_faces
+from gyroid_cad.kernel.solid import KernelFace, KernelShape
 from gyroid_cad.kernel.split import bounded_solids, inner_sides
 from gyroid_cad.trim.clearance import NearMisses
 from gyroid_cad.trim.measures import joined
@@ -40,7 +39,7 @@ Floats = NDArray[np.float64]
 
 FLUIDS = (FLUID_A, FLUID_B)
 # By fluid; of openings that name none, all of them.
-OpenFaces = dict[str, list[TopoDS_Face]]
+OpenFaces = dict[str, list[KernelFace]]
 ANY = ""
 # What is before the colon of an opening that names its fluid.
 _LETTERS = {"a": FLUID_A, "b": FLUID_B}
@@ -229,14 +228,14 @@ class PortedFilling:
         if len(walls) == 1:
             domains[WALL] = [replace(walls[0], volume=left)]
 
-    def _made(self, solid: TopoDS_Shape, sizes: FaceSizes, made: dict[str, _Fluid], body: str) -> Made:
+    def _made(self, solid: KernelShape, sizes: FaceSizes, made: dict[str, _Fluid], body: str) -> Made:
         size = sizes.of(solid)
-        names = tuple(_name_of(face, made, body) for face in parts_of(solid, TopAbs_FACE))
+        names = tuple(_name_of(face, made, body) for face in faces_of(solid))
         return Made(solid, size.volume, size.area, size.centroid, names)
 
-    def _wall_faces(self, made: dict[str, _Fluid]) -> list[TopoDS_Face]:
+    def _wall_faces(self, made: dict[str, _Fluid]) -> list[KernelFace]:
         """Faces of the wall with the skin: the part's own, what is left of openings, and those of both fluids."""
-        faces: list[TopoDS_Face] = []
+        faces: list[KernelFace] = []
         opened = {name: fluid.opened_faces() for name, fluid in made.items()}
         for name, fluid in made.items():
             own, rims = fluid.outer_faces(opened[name])
@@ -249,7 +248,7 @@ class PortedFilling:
 
 
 class _Fluid:
-    """What was crossed for one fluid, and which pieces of its core's boundary are its own."""
+    """Pieces that were crossed for one fluid, and those of its core's boundary that are its own."""
 
     def __init__(self, name: str, filling: Filling, infill: Infill, crossed: Crossed) -> None:
         assert filling.hollow is not None
@@ -265,20 +264,18 @@ class _Fluid:
     def wanted_at(self, point: Floats) -> bool:
         return bool(self.infill.contains(self.filling.regions[0], point[np.newaxis])[0])
 
-    def opened_faces(self) -> list[TopoDS_Face]:
+    def opened_faces(self) -> list[KernelFace]:
         """Faces of the part that are open for this fluid."""
         return list(self.filling.opened)
 
-    def outer_faces(
-        self, opened: Sequence[TopoDS_Face]
-    ) -> tuple[list[tuple[TopoDS_Face, TopoDS_Face]], list[TopoDS_Face]]:
+    def outer_faces(self, opened: Sequence[KernelFace]) -> tuple[list[tuple[KernelFace, KernelFace]], list[KernelFace]]:
         """The part's faces that are not open for this fluid, each with what has become of it, and rims of others."""
-        originals = [as_face(face) for face in parts_of(self.filling.part.shape, TopAbs_FACE)]
+        originals = faces_of(self.filling.part.shape)
         kept = [face for face in originals if not any(face.IsSame(other) for other in opened)]
         skin = list(self.hollow.skin_faces(self.crossed.pieces))
         return list(zip(kept, skin[: len(kept)], strict=True)), skin[len(kept) :]
 
-    def turned_faces(self) -> list[TopoDS_Face]:
+    def turned_faces(self) -> list[KernelFace]:
         """Faces between the wall and this fluid as the wall has them, and what the wall has of its mouths."""
         pieces = self.crossed.pieces
         ends = [
@@ -289,7 +286,7 @@ class _Fluid:
         ]
         return [*(as_face(face.Reversed()) for face in (*pieces.inside, *self.crossed.faces)), *ends]
 
-    def name_of(self, face: TopoDS_Shape) -> str | None:
+    def name_of(self, face: KernelShape) -> str | None:
         """Name of a face that was made for this fluid."""
         if self._lattice.Contains(face):
             return f"{WALL}/{self.name[-1]}"
@@ -302,6 +299,6 @@ class _Fluid:
         return f"{self.name[-1]}:{sum(self.hollow.opened[: origin + 1])}" if self.inner[number] else f"{SKIN}/outside"
 
 
-def _name_of(face: TopoDS_Shape, made: dict[str, _Fluid], body: str) -> str:
+def _name_of(face: KernelShape, made: dict[str, _Fluid], body: str) -> str:
     found = (fluid.name_of(face) for fluid in made.values())
     return next(filter(None, found), f"{SKIN}/outside")

@@ -11,8 +11,6 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from OCP.TopAbs import TopAbs_FACE
-from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
@@ -21,14 +19,14 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import SKIN, WALL, Region
 from gyroid_cad.kernel.boundary import ReadBoundary
-from gyroid_cad.kernel.check import measure, parts_of
+from gyroid_cad.kernel.check import faces_of, measure
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.crossed import FaceSizes, crossed_pieces
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.shells import VolumeOf, connected_shells
 from gyroid_cad.kernel.skin import Hollow
-from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.solid import KernelFace, KernelShape
 from gyroid_cad.kernel.split import Pieces, bounded_solids, parted_solids
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
@@ -187,7 +185,7 @@ class Crossed:
     Attributes
     ----------
     pieces : Pieces
-    faces : list of TopoDS_Face
+    faces : list of KernelFace
         Uncut.
     measures : PieceMeasures
         Of the pieces of the lattice's faces, of those of the boundary, and of the uncut faces.
@@ -198,13 +196,13 @@ class Crossed:
     """
 
     pieces: Pieces
-    faces: list[TopoDS_Face]
+    faces: list[KernelFace]
     measures: PieceMeasures
     middle: Floats
     sides: list[int]
 
     @property
-    def measured(self) -> list[TopoDS_Face]:
+    def measured(self) -> list[KernelFace]:
         """Faces in the order of their measures."""
         return [*self.pieces.inside, *self.pieces.boundary, *self.faces]
 
@@ -215,7 +213,7 @@ def _bodies(job: Job, infill: Infill, crossed: Crossed) -> dict[str, list[Made]]
     pieces, faces = crossed.pieces, crossed.faces
     sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
 
-    def volume_of(shell: TopoDS_Shape) -> float:
+    def volume_of(shell: KernelShape) -> float:
         return sizes.of(shell).volume
 
     with job.timed("join"):
@@ -248,7 +246,7 @@ class _FaceNames:
 
     def fluid_of(self, solid: KernelShape) -> str:
         """Name of the fluid that a solid beside the wall is."""
-        numbers = (self._numbers.FindIndex(face) for face in parts_of(solid, TopAbs_FACE))
+        numbers = (self._numbers.FindIndex(face) for face in faces_of(solid))
         side = next((self._sides[number - 1] for number in numbers if 0 < number <= len(self._sides)), None)
         if side is None:
             raise KernelError("a piece of the part meets no wall, so that it belongs to neither fluid")
@@ -256,7 +254,7 @@ class _FaceNames:
 
     def of(self, solid: KernelShape, body: str) -> tuple[str, ...]:
         """Names of the faces of a body, in the order in which the kernel counts them."""
-        return tuple(self._name(int(self._numbers.FindIndex(face)) - 1, body) for face in parts_of(solid, TopAbs_FACE))
+        return tuple(self._name(int(self._numbers.FindIndex(face)) - 1, body) for face in faces_of(solid))
 
     def _name(self, number: int, body: str) -> str:
         if number < 0:

@@ -224,6 +224,11 @@ def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Sha
         explorer.Next()
 
 
+def faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
+    """The faces of a shape, in the order in which the kernel counts them."""
+    return [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
+
+
 def compound_of(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:
     """The shapes in one compound."""
     builder, compound = BRep_Builder(), TopoDS_Compound()

@@ -1,4 +1,4 @@
-"""Places where a lattice all but touches a part, and how far to shift it so that none is left.
+"""Places at which a lattice all but touches a part, and how far to shift it so that none is left.
 
 Where a corner of the lattice lies a hundredth of a millimetre off the part's boundary the cut leaves an edge or a face
 of that size, which receivers refuse. A lattice that has no end may stand anywhere: shifted by some hundredths of its
@@ -7,7 +7,7 @@ cell it is clear of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,9 @@ from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.lattice_faces import LatticeFaces, pairs_of
 from gyroid_cad.trim.nodes import edge_segments
+from gyroid_cad.wall.covering import Frame
 
-__all__ = ["NearMisses", "clear_shift", "near_misses"]
+__all__ = ["NearMisses", "clear_frame", "clear_shift", "near_misses"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,6 +35,12 @@ _SHIFTS, _AT_ONCE = 4096, 2**22
 _NEWTON_STEPS = 4
 # Of a place that belongs to a face or all but does, how far out it is in the square.
 _BESIDE = 1.1
+# The shortest edge wanted: receivers refuse some under 0.02 mm; of small cells a part of the cell.
+_SHORTEST, _SHORTEST_OF_CELL = 0.025, 1 / 120
+# How far a lattice may be shifted, in cells; and how often, for where curved faces end up is not foretold exactly.
+_FURTHEST, _ROUNDS = 0.04, 3
+# A shift that leaves more than this of the near misses is not worth being out of place.
+_WORTHWHILE = 0.5
 # The sine of an angle at which two curves run side by side: no shift across both parts them.
 _ALONGSIDE = 1e-2
 
@@ -140,6 +147,36 @@ def clear_shift(misses: NearMisses, least: float, most: float) -> Floats:
     return np.asarray(best)
 
 
+def clear_frame(misses_in: Callable[[Frame, float], NearMisses], frame: Frame, cell_size: float) -> Frame:
+    """Move a lattice by a few hundredths of a cell, where that leaves none or fewer of the edges that are too short.
+
+    Parameters
+    ----------
+    misses_in : callable
+        Near misses of a lattice in a frame, within so many mm.
+    frame : Frame
+        Where it stands.
+    cell_size : float
+        In mm.
+    """
+    least, most = min(_SHORTEST, _SHORTEST_OF_CELL * cell_size), _FURTHEST * cell_size
+    best, fewest, tried = frame, 0, frame
+    for round_ in range(_ROUNDS):
+        misses = misses_in(tried, least + most)
+        short = misses.count_below(least)
+        if not round_:
+            fewest = short
+        elif short <= _WORTHWHILE * fewest:
+            best, fewest = tried, short
+        if not short:
+            break
+        shift = clear_shift(misses, least, most)
+        if misses.moved(shift).count_below(least) > _WORTHWHILE * fewest:
+            break
+        tried = replace(tried, origin=tried.origin + shift)
+    return best
+
+
 def _near_faces(rims: Floats, part: Integers, boundary: Boundary, within: float) -> NearMisses:
     """Corners and turning places of rims (m, q, 3) near faces of the part (m,)."""
     rough, error = boundary.rough_depths(part, rims)
@@ -220,7 +257,7 @@ def _nearest(
     t: Floats,
     within: float,
 ) -> NearMisses:
-    """Where rims and edges are nearest to each other, by steps to where their tangents are."""
+    """Find where rims and edges are nearest to each other, by steps to where their tangents are."""
     first, last = (np.array([getattr(boundary.edges[k], name) for k in edge.tolist()]) for name in ("first", "last"))
     for step in range(_NEWTON_STEPS + 1):
         u, v = square_points(side, along)

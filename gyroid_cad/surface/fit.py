@@ -1,9 +1,8 @@
 """Least-squares fit of the semi-fundamental patch by a NURBS surface: the paper's eqs. (11) to (13).
 
 Points and unit normals are fitted in one basis, so that the faces of a wall of thickness t are the
-control nets ``P +- t/2 N``. In the smooth parameterisation the corners are interpolated, then each edge
-is fitted from its own samples alone, then the interior: an edge's control points depend on nothing but
-the edge, so two patches that meet there get the same ones.
+control nets ``P +- t/2 N``. In the smooth parameterisation an edge's control points depend on nothing but the edge, so
+two patches that meet there get the same ones, and tangent planes along it are the exact surface's.
 """
 
 from __future__ import annotations
@@ -17,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.basis import gauss_points, rational_basis, uniform_knots
-from gyroid_cad.nurbs.surface import NurbsSurface, edge_row, first_fold, layer_areas
+from gyroid_cad.nurbs.basis import uniform_knots
+from gyroid_cad.nurbs.surface import NurbsSurface, first_fold, layer_areas
+from gyroid_cad.surface.fit_nets import cloud_net, staged_net
 from gyroid_cad.surface.patch import (
     EDGE_HALF_TURN,
     PARAMETERISATIONS,
     ROTOINVERSION,
     edge_half_turn_shift,
-    parameter_corners,
 )
 from gyroid_cad.surface.weierstrass import GYROID, Family
 
@@ -162,8 +161,6 @@ def _validated_weights(weights: tuple[tuple[float, ...], ...], control_points: i
 
 # Edges further apart than this, in units of the cell size, are not one edge: rounding leaves 1e-15.
 EDGE_GAP_LIMIT = 1e-12
-_SAMPLES_PER_SPAN = 4
-_CLOUD_RADII = 48
 # Odd, so that the patch's centre, where it curves most, is among them.
 _FOLD_SAMPLES = 97
 _OURS = FitSettings()
@@ -209,9 +206,9 @@ def fit_patch(settings: FitSettings = _OURS, family: Family = GYROID) -> FittedP
     -------
     FittedPatch
     """
-    fit = _fit_cloud if settings.parameterisation == "polar" else _fit_staged
-    net = fit(settings, family)
     knots, weights = settings.knot_vector(), settings.weight_net()
+    fit = cloud_net if settings.parameterisation == "polar" else staged_net
+    net = fit(knots, weights, partial(PARAMETERISATIONS[settings.parameterisation], family=family))
     surface, normals = (NurbsSurface(net[..., part], weights, knots, knots) for part in (slice(3), slice(3, 6)))
     return FittedPatch(settings, family, surface, normals)
 
@@ -267,67 +264,3 @@ def _gap(surface: NurbsSurface, shift: Floats, turned_over: float = 1.0) -> floa
     edges = [surface.edge(k).evaluate(along) @ np.linalg.matrix_power(turn, 3 - k).T for k in range(4)]
     images = [edge[::-1] @ EDGE_HALF_TURN.T + shift for edge in edges]
     return float(max(np.max(np.linalg.norm(edge - image, axis=1)) for edge in edges for image in images))
-
-
-def _fit_staged(settings: FitSettings, family: Family) -> Floats:
-    """Corners, then edges, then interior; returns the net of (point, normal), shape (n, n, 6)."""
-    n, knots, weights = settings.control_points, settings.knot_vector(), settings.weight_net()
-    exact = partial(PARAMETERISATIONS[settings.parameterisation], family=family)
-    samples, sample_weights = gauss_points(knots, _SAMPLES_PER_SPAN)
-    net = np.zeros((n, n, 6))
-    for k, (u, v) in enumerate(parameter_corners()):
-        edge_row(net, k)[0] = np.concatenate(exact(u, v), axis=-1)
-    ones = np.ones_like(samples)
-    square = ((samples, -ones), (ones, samples), (-samples, ones), (-ones, -samples))
-    for k, (u, v) in enumerate(square):
-        rational = rational_basis(edge_row(weights, k), (knots,), samples[:, np.newaxis])[0]
-        row = edge_row(net, k)
-        known = rational[:, [0, -1]] @ row[[0, -1]]
-        row[1:-1] = _least_squares(rational[:, 1:-1], np.concatenate(exact(u, v), axis=-1) - known, sample_weights)
-    inner = np.zeros((n, n), dtype=bool)
-    inner[1:-1, 1:-1] = True
-    places = np.stack(np.meshgrid(samples, samples, indexing="ij"), axis=-1).reshape(-1, 2)
-    rational = rational_basis(weights, (knots, knots), places)[0]
-    known = rational[:, ~inner.ravel()] @ net[~inner]
-    u, v = samples[:, np.newaxis], samples[np.newaxis]
-    wanted = np.concatenate(exact(u, v), axis=-1).reshape(-1, 6) - known
-    quadrature = np.outer(sample_weights, sample_weights).ravel()
-    rational = rational[:, inner.ravel()]
-    net[inner] = _least_squares(rational, wanted, quadrature)
-
-    derivatives = NurbsSurface(net[..., :3], weights, knots, knots).derivatives(u, v)
-    area = np.cross(derivatives[1, 0], derivatives[0, 1]).reshape(-1, 3)
-    net[inner, 3:] += _missing_normals(rational, quadrature, area, (known + rational @ net[inner])[:, 3:])
-    return net
-
-
-def _missing_normals(rational: Floats, quadrature: Floats, area: Floats, normals: Floats) -> Floats:
-    """Correction to the normals' inner control points that makes them carry the surface's whole area.
-
-    Least squares leave the sum of N . dA short by 7.5e-7 of the area at 10 x 10, and every wall's volume with
-    it. The missing part is spread along the area vectors; edges, which neighbours share, keep theirs.
-    """
-    spread = _least_squares(rational, area, quadrature)
-    shortage = quadrature @ (np.linalg.norm(area, axis=1) - np.sum(normals * area, axis=1))
-    return np.asarray(spread * (shortage / (quadrature @ np.sum(rational @ spread * area, axis=1))))
-
-
-def _fit_cloud(settings: FitSettings, family: Family) -> Floats:
-    """All control points at once, from a cloud even in radius and angle (Fig. 5); shape (n, n, 6)."""
-    n, knots = settings.control_points, settings.knot_vector()
-    radius = np.arange(1, _CLOUD_RADII + 1) / _CLOUD_RADII
-    along = np.linspace(-1, 1, _CLOUD_RADII, endpoint=False)
-    ones = np.ones_like(along)
-    border_u = np.concatenate([along, ones, -along, -ones])
-    border_v = np.concatenate([-ones, along, ones, -along])
-    u = np.append(np.outer(radius, border_u).ravel(), 0.0)
-    v = np.append(np.outer(radius, border_v).ravel(), 0.0)
-    rational = rational_basis(settings.weight_net(), (knots, knots), np.stack([u, v], axis=-1))[0]
-    samples = np.concatenate(PARAMETERISATIONS[settings.parameterisation](u, v, family), axis=-1)
-    return _least_squares(rational, samples, np.ones(len(u))).reshape(n, n, 6)
-
-
-def _least_squares(rows: Floats, wanted: Floats, sample_weights: Floats) -> Floats:
-    """Eqs. (12), (13), with one weight a sample: (R^T W R)^-1 R^T W S."""
-    weighted = rows.T * sample_weights
-    return np.asarray(np.linalg.solve(weighted @ rows, weighted @ wanted), dtype=float)

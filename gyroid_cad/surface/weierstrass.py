@@ -93,11 +93,11 @@ GYROID = Family(
     "gyroid",
     atan2(K, K_PRIME),
     sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME),
-    (0.0801, -0.0037j),
-    (-0.0229, 0.0103),
+    (0.05715, -0.00915j),
+    (-0.00337, 0.01132),
 )
-DIAMOND = Family("diamond", 0.0, 1 / K, (0.0702, -0.0103), (-0.0040, -0.0004))
-PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.0918, 0.0085), (0.0579, -0.0349))
+DIAMOND = Family("diamond", 0.0, 1 / K, (0.06764, -0.01477), (-0.01053, 0.00038))
+PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.07649, 0.00612), (0.07029, -0.03472))
 
 
 def rotoinversion(vectors: ArrayLike, times: int = 1) -> Floats:

@@ -23,6 +23,7 @@ from gyroid_cad.wall.distances import met_along_normals
 from gyroid_cad.wall.exact import offset_patches
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.tangency import smoothed
 
 __all__ = ["Refit", "fitted_nets", "graded_wall", "likely_control_points", "measured"]
 
@@ -158,7 +159,7 @@ def graded_wall(complex: CellComplex, grading: Grading, control_points: int) -> 
         knots=uniform_knots(control_points),
     )
     _require_shared_edges(wall, grading.cell_size)
-    return wall
+    return smoothed(wall)
 
 
 def fitted_nets(complex: CellComplex, grading: Grading, control_points: int, patches: Integers) -> Floats:

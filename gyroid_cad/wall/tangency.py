@@ -1,0 +1,191 @@
+"""Tangent planes along the edges of a graded wall: faces of neighbours, fitted each by itself, are turned to meet smoothly.
+
+Fits of neighbours have their edge in common and differ, by the error of the fit, in how they leave it: by a tenth of a
+degree at 10 x 10. Both are turned to the mean of their normals: first the edges' ends, so that at every corner all rates
+lie in one plane, then each patch along its four edges, by the least change of its inner control points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gyroid_cad.common.arrays import dot, unit
+from gyroid_cad.nurbs.basis import basis, gauss_points, images, uniform_knots
+from gyroid_cad.nurbs.surface import edge_row
+from gyroid_cad.nurbs.tangency import border_rates, inner_controls, least_change
+from gyroid_cad.wall.offset import SIDES, Wall
+
+__all__ = ["smoothed"]
+
+Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+_DEGREE = 3
+# In degrees. Faces that meet so well are left as they are; where they meet at more than the larger angle, the field
+# itself has an edge, or the fit is too coarse to tell.
+_SMOOTH_ENOUGH, _MEANT_SMOOTH = 0.005, 0.5
+# Places on an edge at which its tangent plane is asked for, by control points; and how firmly.
+_PLACES_PER_CONTROL_POINT = 1.5
+_FIRMNESS = 1e3
+# Of an edge's ends: exactly, but for normals that have no mean.
+_FIRMLY = 1e9
+# So few that their systems of equations stay in the processor's cache.
+_PATCHES_AT_ONCE = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Borders:
+    """Rates at the borders of a patch, and how its control points answer.
+
+    Attributes
+    ----------
+    inner : ndarray of bool, shape (n * n,)
+        Control points that no edge has.
+    end_rates, end_responses : ndarray, shape (2, n), (n - 2, 2)
+        Of a curve at its ends; of its inner control points to unit conditions there.
+    running, inward : ndarray, shape (4 q, n * n)
+        Along the edges, and across.
+    responses : ndarray, shape (inner, 4 q)
+    follow : ndarray, shape (inner, n * n - inner)
+        Change of the inner control points by which least squares answer one of the edges'.
+    """
+
+    inner: Booleans
+    end_rates: Floats
+    end_responses: Floats
+    running: Floats
+    inward: Floats
+    responses: Floats
+    follow: Floats
+
+
+@lru_cache(maxsize=8)
+def _borders(control_points: int) -> _Borders:
+    knots = uniform_knots(control_points)
+    places, quadrature = gauss_points(knots, _DEGREE + 1)
+    functions = basis(knots, _DEGREE, places)
+    gram = functions.T * quadrature @ functions
+    compliance = np.linalg.inv(gram[1:-1, 1:-1])
+    end_rates = basis(knots, _DEGREE, np.array([-1.0, 1.0]), 1)
+    inner = inner_controls(control_points)
+    along = np.linspace(-1, 1, round(_PLACES_PER_CONTROL_POINT * control_points))
+    running, inward = (
+        rates.reshape(-1, len(inner)) for rates in border_rates(np.ones((control_points,) * 2), knots, along)
+    )
+    compliances = np.kron(compliance, compliance)
+    return _Borders(
+        inner=inner,
+        end_rates=end_rates,
+        end_responses=compliance @ end_rates[:, 1:-1].T,
+        running=running,
+        inward=inward,
+        responses=compliances @ inward[:, inner].T,
+        follow=-compliances @ np.kron(gram, gram)[np.ix_(inner, ~inner)],
+    )
+
+
+def smoothed(wall: Wall) -> Wall:
+    """Turn the faces of neighbouring patches to common tangent planes along their edges.
+
+    Edges stay common, to rounding. Where faces meet at half a degree and more they are left as they are.
+
+    Parameters
+    ----------
+    wall : Wall
+        In which every patch has a net of its own, without weights.
+
+    Returns
+    -------
+    Wall
+    """
+    borders = _borders(len(wall.weights))
+    nets = wall.nets.reshape(-1, len(borders.inner), 3).copy()
+    common, meant, apart = _at_edges(wall, _normals(nets, borders))
+    if not np.any(apart[meant] > _SMOOTH_ENOUGH):
+        return wall
+    _turn_ends(wall, nets, borders)
+    common, meant, _ = _at_edges(wall, _normals(nets, borders))
+    for first in range(0, len(nets), _PATCHES_AT_ONCE):
+        some = slice(first, first + _PATCHES_AT_ONCE)
+        wanted = np.where(meant[some], -dot(images(borders.inward, nets[some]), common[some]), 0.0)
+        nets[some, borders.inner] += least_change(
+            borders.responses, borders.inward[:, borders.inner], common[some], wanted, _FIRMNESS
+        )
+    return replace(wall, nets=nets.reshape(wall.nets.shape))
+
+
+def _normals(nets: Floats, borders: _Borders) -> Floats:
+    """Unit normals along the four edges of faces, in running order; shape (faces, 4 q, 3)."""
+    return unit(np.cross(images(borders.running, nets), images(borders.inward, nets)))
+
+
+def _at_edges(wall: Wall, normals: Floats) -> tuple[Floats, Booleans, Floats]:
+    """Of each face along its edges: the mean of its and its neighbour's normals, as :func:`_common` tells it."""
+    complex = wall.complex
+    # By patch, edge and side; along the edge as the edge runs, whichever way the patch does.
+    by_edge = np.swapaxes(normals.reshape(complex.patch_count, len(SIDES), 4, -1, 3), 1, 2)
+    backwards = ~complex.edge_forward
+    by_edge = np.ascontiguousarray(by_edge)
+    by_edge[backwards] = by_edge[backwards][..., ::-1, :]
+    found = _common(complex.patch_edges.ravel(), by_edge.reshape(-1, *by_edge.shape[2:]))
+    back = []
+    for values in found:
+        shaped = values.reshape(*by_edge.shape[:2], *values.shape[1:])
+        shaped[backwards] = shaped[backwards][:, :, ::-1]
+        back.append(np.swapaxes(shaped, 1, 2).reshape(len(normals), normals.shape[1], *values.shape[3:]))
+    return back[0], back[1], back[2]
+
+
+def _common(numbers: Integers, normals: Floats) -> tuple[Floats, Booleans, Floats]:
+    """Mean of the normals of the same number, whether they are meant to be one, and how far apart they are.
+
+    Parameters
+    ----------
+    numbers : ndarray of int, shape (m,)
+    normals : ndarray, shape (m, ..., 3)
+
+    Returns
+    -------
+    mean : ndarray, shape (m, ..., 3)
+    meant : ndarray of bool, shape (m, ...)
+    apart : ndarray, shape (m, ...)
+        In degrees: twice the largest angle from the mean.
+    """
+    order = np.argsort(numbers, kind="stable")
+    distinct, first, group = np.unique(numbers[order], return_index=True, return_inverse=True)
+    member = np.empty(len(numbers), dtype=np.int64)
+    member[order] = group
+    mean = unit(np.add.reduceat(normals[order], first))
+    chord = np.linalg.norm(normals - mean[member], axis=-1)
+    widest = np.maximum.reduceat(chord[order], first)
+    apart = np.degrees(4 * np.arcsin(np.minimum(widest / 2, 1.0)))[member]
+    return mean[member], apart <= _MEANT_SMOOTH, apart
+
+
+def _turn_ends(wall: Wall, nets: Floats, borders: _Borders) -> None:
+    """Turn the ends of all edges into the tangent planes of the corners, the means of the faces' that meet there."""
+    complex, count = wall.complex, len(wall.weights)
+    normals = _normals(nets, borders).reshape(complex.patch_count, len(SIDES), 4, -1, 3)
+    at_corners = np.swapaxes(normals[..., 0, :], 1, 2).reshape(-1, len(SIDES), 3)
+    mean, meant, _ = (
+        np.swapaxes(found.reshape(complex.patch_count, 4, *found.shape[1:]), 1, 2).reshape(len(nets), 4, *found.shape[2:])
+        for found in _common(complex.patch_fans.ravel(), at_corners)
+    )
+    grid = nets.reshape(-1, count, count, 3)
+    change = np.zeros_like(grid)
+    rows, changes = (np.moveaxis(net, (1, 2), (0, 1)) for net in (grid, change))
+    for k in range(4):
+        ends = np.stack([mean[:, k], mean[:, (k + 1) % 4]], axis=1)
+        both_meant = np.stack([meant[:, k], meant[:, (k + 1) % 4]], axis=1)
+        rates = np.einsum("ei,ifc->fec", borders.end_rates, edge_row(rows, k))
+        wanted = np.where(both_meant, -dot(rates, ends), 0.0)
+        turned = least_change(borders.end_responses, borders.end_rates[:, 1:-1], ends, wanted, _FIRMLY)
+        edge_row(changes, k)[1:-1] = np.moveaxis(turned, 1, 0)
+    flat = change.reshape(nets.shape)
+    flat[:, borders.inner] = images(borders.follow, flat[:, ~borders.inner])
+    nets += flat

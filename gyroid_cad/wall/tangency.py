@@ -28,14 +28,16 @@ Integers = NDArray[np.int64]
 _DEGREE = 3
 # In degrees. Faces that meet so well are left as they are; where they meet at more than the larger angle, the field
 # itself has an edge, or the fit is too coarse to tell.
-_SMOOTH_ENOUGH, _MEANT_SMOOTH = 0.005, 0.5
+_SMOOTH_ENOUGH, _MEANT_SMOOTH = 0.015, 0.5
+# Turned, faces meet at a new mean: once more halves what is left.
+_ROUNDS = 2
 # Places on an edge at which its tangent plane is asked for, by control points; and how firmly.
 _PLACES_PER_CONTROL_POINT = 1.5
 _FIRMNESS = 1e3
 # Of an edge's ends: exactly, but for normals that have no mean.
 _FIRMLY = 1e9
 # So few that their systems of equations stay in the processor's cache.
-_PATCHES_AT_ONCE = 32
+_FACES_AT_ONCE = 32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +75,8 @@ def _borders(control_points: int) -> _Borders:
     compliance = np.linalg.inv(gram[1:-1, 1:-1])
     end_rates = basis(knots, _DEGREE, np.array([-1.0, 1.0]), 1)
     inner = inner_controls(control_points)
-    along = np.linspace(-1, 1, round(_PLACES_PER_CONTROL_POINT * control_points))
+    # At the ends the edges beyond say how the surface leaves.
+    along = np.linspace(-1, 1, round(_PLACES_PER_CONTROL_POINT * control_points))[1:-1]
     running, inward = (
         rates.reshape(-1, len(inner)) for rates in border_rates(np.ones((control_points,) * 2), knots, along)
     )
@@ -105,32 +108,45 @@ def smoothed(wall: Wall) -> Wall:
     """
     borders = _borders(len(wall.weights))
     nets = wall.nets.reshape(-1, len(borders.inner), 3).copy()
-    common, meant, apart = _at_edges(wall, _normals(nets, borders))
-    if not np.any(apart[meant] > _SMOOTH_ENOUGH):
-        return wall
-    _turn_ends(wall, nets, borders)
-    common, meant, _ = _at_edges(wall, _normals(nets, borders))
-    for first in range(0, len(nets), _PATCHES_AT_ONCE):
-        some = slice(first, first + _PATCHES_AT_ONCE)
-        wanted = np.where(meant[some], -dot(images(borders.inward, nets[some]), common[some]), 0.0)
-        nets[some, borders.inner] += least_change(
-            borders.responses, borders.inward[:, borders.inner], common[some], wanted, _FIRMNESS
-        )
+    for turn in range(_ROUNDS):
+        common, wanted, apart = _conditions(wall, nets, borders)
+        worst = apart.reshape(len(wall.nets), -1).max(axis=1)
+        if worst.max() <= _SMOOTH_ENOUGH:
+            break
+        if turn == 0:
+            _turn_ends(wall, nets, borders)
+            common, wanted, _ = _conditions(wall, nets, borders)
+        faces = np.flatnonzero(np.repeat(worst > _SMOOTH_ENOUGH, len(SIDES)))
+        inner, rates = np.flatnonzero(borders.inner), borders.inward[:, borders.inner]
+        for first in range(0, len(faces), _FACES_AT_ONCE):
+            some = faces[first : first + _FACES_AT_ONCE]
+            change = least_change(borders.responses, rates, common[some], wanted[some], _FIRMNESS)
+            nets[some[:, np.newaxis], inner] += change
     return replace(wall, nets=nets.reshape(wall.nets.shape))
 
 
-def _normals(nets: Floats, borders: _Borders) -> Floats:
-    """Unit normals along the four edges of faces, in running order; shape (faces, 4 q, 3)."""
-    return unit(np.cross(images(borders.running, nets), images(borders.inward, nets)))
+def _conditions(wall: Wall, nets: Floats, borders: _Borders) -> tuple[Floats, Floats, Floats]:
+    """Normals that neighbours are to have in common along the edges of each face, and what is missing.
+
+    Returns
+    -------
+    common : ndarray, shape (faces, 4 q, 3)
+    wanted : ndarray, shape (faces, 4 q)
+        Change of the parts along them of the rates inwards.
+    apart : ndarray, shape (faces, 4 q)
+        Angle between neighbours' normals, in degrees; nothing where they are not to have one in common.
+    """
+    inward = images(borders.inward, nets)
+    common, meant, apart = _at_edges(wall, unit(np.cross(images(borders.running, nets), inward)))
+    return common, np.where(meant, -dot(inward, common), 0.0), np.where(meant, apart, 0.0)
 
 
 def _at_edges(wall: Wall, normals: Floats) -> tuple[Floats, Booleans, Floats]:
     """Of each face along its edges: the mean of its and its neighbour's normals, as :func:`_common` tells it."""
     complex = wall.complex
     # By patch, edge and side; along the edge as the edge runs, whichever way the patch does.
-    by_edge = np.swapaxes(normals.reshape(complex.patch_count, len(SIDES), 4, -1, 3), 1, 2)
+    by_edge = np.ascontiguousarray(np.swapaxes(normals.reshape(complex.patch_count, len(SIDES), 4, -1, 3), 1, 2))
     backwards = ~complex.edge_forward
-    by_edge = np.ascontiguousarray(by_edge)
     by_edge[backwards] = by_edge[backwards][..., ::-1, :]
     found = _common(complex.patch_edges.ravel(), by_edge.reshape(-1, *by_edge.shape[2:]))
     back = []
@@ -170,22 +186,22 @@ def _common(numbers: Integers, normals: Floats) -> tuple[Floats, Booleans, Float
 def _turn_ends(wall: Wall, nets: Floats, borders: _Borders) -> None:
     """Turn the ends of all edges into the tangent planes of the corners, the means of the faces' that meet there."""
     complex, count = wall.complex, len(wall.weights)
-    normals = _normals(nets, borders).reshape(complex.patch_count, len(SIDES), 4, -1, 3)
-    at_corners = np.swapaxes(normals[..., 0, :], 1, 2).reshape(-1, len(SIDES), 3)
-    mean, meant, _ = (
-        np.swapaxes(found.reshape(complex.patch_count, 4, *found.shape[1:]), 1, 2).reshape(len(nets), 4, *found.shape[2:])
-        for found in _common(complex.patch_fans.ravel(), at_corners)
-    )
     grid = nets.reshape(-1, count, count, 3)
     change = np.zeros_like(grid)
     rows, changes = (np.moveaxis(net, (1, 2), (0, 1)) for net in (grid, change))
+    rates = np.stack([np.einsum("ei,ifc->fec", borders.end_rates, edge_row(rows, k)) for k in range(4)], axis=1)
+    # An edge leaves a corner where the one before it comes in.
+    normals = unit(np.cross(np.roll(rates[:, :, 1], 1, axis=1), rates[:, :, 0]))
+    by_corner = np.swapaxes(normals.reshape(-1, len(SIDES), 4, 3), 1, 2).reshape(-1, len(SIDES), 3)
+    mean, meant, _ = (
+        np.swapaxes(found.reshape(-1, 4, *found.shape[1:]), 1, 2).reshape(len(nets), 4, *found.shape[2:])
+        for found in _common(complex.patch_fans.ravel(), by_corner)
+    )
+    ends, both_meant = (np.stack([some, np.roll(some, -1, axis=1)], axis=2) for some in (mean, meant))
+    wanted = np.where(both_meant, -dot(rates, ends), 0.0)
+    turned = least_change(borders.end_responses, borders.end_rates[:, 1:-1], ends, wanted, _FIRMLY)
     for k in range(4):
-        ends = np.stack([mean[:, k], mean[:, (k + 1) % 4]], axis=1)
-        both_meant = np.stack([meant[:, k], meant[:, (k + 1) % 4]], axis=1)
-        rates = np.einsum("ei,ifc->fec", borders.end_rates, edge_row(rows, k))
-        wanted = np.where(both_meant, -dot(rates, ends), 0.0)
-        turned = least_change(borders.end_responses, borders.end_rates[:, 1:-1], ends, wanted, _FIRMLY)
-        edge_row(changes, k)[1:-1] = np.moveaxis(turned, 1, 0)
+        edge_row(changes, k)[1:-1] = np.moveaxis(turned[:, k], 1, 0)
     flat = change.reshape(nets.shape)
     flat[:, borders.inner] = images(borders.follow, flat[:, ~borders.inner])
     nets += flat

@@ -1,8 +1,9 @@
-"""Tangent planes along the edges of a graded wall: faces of neighbours, fitted each by itself, are turned to meet smoothly.
+"""Tangent planes along the edges of a graded wall: faces of neighbours are turned to meet smoothly.
 
-Fits of neighbours have their edge in common and differ, by the error of the fit, in how they leave it: by a tenth of a
-degree at 10 x 10. Both are turned to the mean of their normals: first the edges' ends, so that at every corner all rates
-lie in one plane, then each patch along its four edges, by the least change of its inner control points.
+Fits of neighbours, each made by itself, have their edge in common and differ, by the error of the fit, in how they
+leave it: by a tenth of a degree at 10 x 10. Both are turned to the mean of their normals: first the edges' ends, so
+that at every corner all rates lie in one plane, then each patch along its four edges, by the least change of its inner
+control points.
 """
 
 from __future__ import annotations
@@ -14,9 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot, unit
-from gyroid_cad.nurbs.basis import basis, gauss_points, images, uniform_knots
+from gyroid_cad.nurbs.basis import (
+    basis,
+    border_rates,
+    gauss_points,
+    images,
+    inner_controls,
+    least_change,
+    uniform_knots,
+)
 from gyroid_cad.nurbs.surface import edge_row
-from gyroid_cad.nurbs.tangency import border_rates, inner_controls, least_change
 from gyroid_cad.wall.offset import SIDES, Wall
 
 __all__ = ["smoothed"]
@@ -137,28 +145,27 @@ def _conditions(wall: Wall, nets: Floats, borders: _Borders) -> tuple[Floats, Fl
         Angle between neighbours' normals, in degrees; nothing where they are not to have one in common.
     """
     inward = images(borders.inward, nets)
-    common, meant, apart = _at_edges(wall, unit(np.cross(images(borders.running, nets), inward)))
+    common, apart = _at_edges(wall, unit(np.cross(images(borders.running, nets), inward)))
+    meant = apart <= _MEANT_SMOOTH
     return common, np.where(meant, -dot(inward, common), 0.0), np.where(meant, apart, 0.0)
 
 
-def _at_edges(wall: Wall, normals: Floats) -> tuple[Floats, Booleans, Floats]:
-    """Of each face along its edges: the mean of its and its neighbour's normals, as :func:`_common` tells it."""
+def _at_edges(wall: Wall, normals: Floats) -> tuple[Floats, Floats]:
+    """The mean of each face's and its neighbour's normals along its edges, and their angle, as of :func:`_common`."""
     complex = wall.complex
     # By patch, edge and side; along the edge as the edge runs, whichever way the patch does.
     by_edge = np.ascontiguousarray(np.swapaxes(normals.reshape(complex.patch_count, len(SIDES), 4, -1, 3), 1, 2))
     backwards = ~complex.edge_forward
     by_edge[backwards] = by_edge[backwards][..., ::-1, :]
-    found = _common(complex.patch_edges.ravel(), by_edge.reshape(-1, *by_edge.shape[2:]))
-    back = []
-    for values in found:
-        shaped = values.reshape(*by_edge.shape[:2], *values.shape[1:])
-        shaped[backwards] = shaped[backwards][:, :, ::-1]
-        back.append(np.swapaxes(shaped, 1, 2).reshape(len(normals), normals.shape[1], *values.shape[3:]))
-    return back[0], back[1], back[2]
+    mean, apart = _common(complex.patch_edges.ravel(), by_edge.reshape(-1, *by_edge.shape[2:]))
+    mean, apart = mean.reshape(by_edge.shape), apart.reshape(by_edge.shape[:-1])
+    mean[backwards] = mean[backwards][..., ::-1, :]
+    apart[backwards] = apart[backwards][..., ::-1]
+    return np.swapaxes(mean, 1, 2).reshape(normals.shape), np.swapaxes(apart, 1, 2).reshape(normals.shape[:-1])
 
 
-def _common(numbers: Integers, normals: Floats) -> tuple[Floats, Booleans, Floats]:
-    """Mean of the normals of the same number, whether they are meant to be one, and how far apart they are.
+def _common(numbers: Integers, normals: Floats) -> tuple[Floats, Floats]:
+    """Mean of the normals of the same number, and the angle between them.
 
     Parameters
     ----------
@@ -168,19 +175,17 @@ def _common(numbers: Integers, normals: Floats) -> tuple[Floats, Booleans, Float
     Returns
     -------
     mean : ndarray, shape (m, ..., 3)
-    meant : ndarray of bool, shape (m, ...)
     apart : ndarray, shape (m, ...)
-        In degrees: twice the largest angle from the mean.
+        Twice the largest angle from the mean, in degrees.
     """
     order = np.argsort(numbers, kind="stable")
-    distinct, first, group = np.unique(numbers[order], return_index=True, return_inverse=True)
+    _, first, group = np.unique(numbers[order], return_index=True, return_inverse=True)
     member = np.empty(len(numbers), dtype=np.int64)
     member[order] = group
-    mean = unit(np.add.reduceat(normals[order], first))
-    chord = np.linalg.norm(normals - mean[member], axis=-1)
-    widest = np.maximum.reduceat(chord[order], first)
-    apart = np.degrees(4 * np.arcsin(np.minimum(widest / 2, 1.0)))[member]
-    return mean[member], apart <= _MEANT_SMOOTH, apart
+    mean = unit(np.add.reduceat(normals[order], first))[member]
+    chord = np.linalg.norm(normals - mean, axis=-1)
+    widest = np.maximum.reduceat(chord[order], first)[member]
+    return mean, np.degrees(4 * np.arcsin(np.minimum(widest / 2, 1.0)))
 
 
 def _turn_ends(wall: Wall, nets: Floats, borders: _Borders) -> None:
@@ -192,12 +197,11 @@ def _turn_ends(wall: Wall, nets: Floats, borders: _Borders) -> None:
     rates = np.stack([np.einsum("ei,ifc->fec", borders.end_rates, edge_row(rows, k)) for k in range(4)], axis=1)
     # An edge leaves a corner where the one before it comes in.
     normals = unit(np.cross(np.roll(rates[:, :, 1], 1, axis=1), rates[:, :, 0]))
-    by_corner = np.swapaxes(normals.reshape(-1, len(SIDES), 4, 3), 1, 2).reshape(-1, len(SIDES), 3)
-    mean, meant, _ = (
-        np.swapaxes(found.reshape(-1, 4, *found.shape[1:]), 1, 2).reshape(len(nets), 4, *found.shape[2:])
-        for found in _common(complex.patch_fans.ravel(), by_corner)
-    )
-    ends, both_meant = (np.stack([some, np.roll(some, -1, axis=1)], axis=2) for some in (mean, meant))
+    by_corner = np.swapaxes(normals.reshape(-1, len(SIDES), 4, 3), 1, 2)
+    mean, apart = _common(complex.patch_fans.ravel(), by_corner.reshape(-1, len(SIDES), 3))
+    common = np.swapaxes(mean.reshape(by_corner.shape), 1, 2).reshape(normals.shape)
+    meant = np.swapaxes(apart.reshape(by_corner.shape[:-1]), 1, 2).reshape(normals.shape[:-1]) <= _MEANT_SMOOTH
+    ends, both_meant = (np.stack([some, np.roll(some, -1, axis=1)], axis=2) for some in (common, meant))
     wanted = np.where(both_meant, -dot(rates, ends), 0.0)
     turned = least_change(borders.end_responses, borders.end_rates[:, 1:-1], ends, wanted, _FIRMLY)
     for k in range(4):

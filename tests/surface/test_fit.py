@@ -20,11 +20,10 @@ from gyroid_cad.surface.fit import (
     FitSettings,
     FittedPatch,
     edge_gap,
-    error_within_reach,
     fit_patch,
     require_shared_edges,
 )
-from gyroid_cad.surface.fit_report import fit_report, fit_within
+from gyroid_cad.surface.fit_report import error_within_reach, fit_report, fit_within
 from gyroid_cad.surface.patch import ROTOINVERSION, parameter_corners, smooth
 from gyroid_cad.surface.weierstrass import Family
 

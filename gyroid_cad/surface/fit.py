@@ -301,14 +301,14 @@ def _staged_net(knots: Floats, weights: Floats, exact: Exact) -> Floats:
 def _round_the_border(exact: Exact, along: Floats) -> list[Floats]:
     """Exact points and normals along each edge, in running order; shape (q, 6) each."""
     ones = np.ones_like(along)
-    square = ((along, -ones), (ones, along), (-along, ones), (-ones, -along))
-    return [np.concatenate(exact(u, v), axis=-1) for u, v in square]
+    u, v = np.concatenate([along, ones, -along, -ones]), np.concatenate([-ones, along, ones, -along])
+    return np.split(np.concatenate(exact(u, v), axis=-1), 4)
 
 
 def _least_squares(functions: Floats, sample_weights: Floats, wanted: Floats, *beside: Floats) -> Floats:
     """Eqs. (12), (13), with one weight a sample, (R^T W R)^-1 R^T W S; beside it (R^T W R)^-1 of other columns."""
     weighted = functions.T * sample_weights
-    return np.linalg.solve(weighted @ functions, np.hstack([weighted @ wanted, *beside]))
+    return np.asarray(np.linalg.solve(weighted @ functions, np.hstack([weighted @ wanted, *beside])))
 
 
 def _fit_edge(row: Floats, weights: Floats, knots: Floats, samples: tuple[Floats, Floats], values: Floats) -> None:
@@ -318,6 +318,8 @@ def _fit_edge(row: Floats, weights: Floats, knots: Floats, samples: tuple[Floats
     wanted = values - rational[:, [0, -1]] @ row[[0, -1]]
     found = _least_squares(rational[:, 1:-1], samples[1], wanted, rates[:, 1:-1].T)
     row[1:-1], responses = found[:, :6], found[:, 6:]
+    if len(row) < _FEWEST_TO_TURN:
+        return
     corner_normals = row[[0, -1], 3:].copy()
     for part in (slice(3), slice(3, 6)):
         off = -dot(rates @ row[:, part], corner_normals)

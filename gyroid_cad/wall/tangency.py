@@ -201,7 +201,8 @@ def _turn_ends(wall: Wall, nets: Floats, borders: _Borders) -> None:
     mean, apart = _common(complex.patch_fans.ravel(), by_corner.reshape(-1, len(SIDES), 3))
     common = np.swapaxes(mean.reshape(by_corner.shape), 1, 2).reshape(normals.shape)
     meant = np.swapaxes(apart.reshape(by_corner.shape[:-1]), 1, 2).reshape(normals.shape[:-1]) <= _MEANT_SMOOTH
-    ends, both_meant = (np.stack([some, np.roll(some, -1, axis=1)], axis=2) for some in (common, meant))
+    ends = np.stack([common, np.roll(common, -1, axis=1)], axis=2)
+    both_meant = np.stack([meant, np.roll(meant, -1, axis=1)], axis=2)
     wanted = np.where(both_meant, -dot(rates, ends), 0.0)
     turned = least_change(borders.end_responses, borders.end_rates[:, 1:-1], ends, wanted, _FIRMLY)
     for k in range(4):

@@ -93,11 +93,11 @@ GYROID = Family(
     "gyroid",
     atan2(K, K_PRIME),
     sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME),
-    (0.05715, -0.00915j),
-    (-0.00337, 0.01132),
+    (0.0386, -0.0142j),
+    (-0.0014, 0.0045),
 )
-DIAMOND = Family("diamond", 0.0, 1 / K, (0.06764, -0.01477), (-0.01053, 0.00038))
-PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.07649, 0.00612), (0.07029, -0.03472))
+DIAMOND = Family("diamond", 0.0, 1 / K, (0.0676, -0.0148), (-0.0105, 0.0004))
+PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.0765, 0.0061), (0.0703, -0.0347))
 
 
 def rotoinversion(vectors: ArrayLike, times: int = 1) -> Floats:

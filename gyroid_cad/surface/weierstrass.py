@@ -97,7 +97,7 @@ GYROID = Family(
     (-0.0014, 0.0045),
 )
 DIAMOND = Family("diamond", 0.0, 1 / K, (0.0676, -0.0148), (-0.0105, 0.0004))
-PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.0765, 0.0061), (0.0703, -0.0347))
+PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.005, 0.01))
 
 
 def rotoinversion(vectors: ArrayLike, times: int = 1) -> Floats:

@@ -297,7 +297,7 @@ def test_names_that_will_not_do_are_refused_before_anything_is_drawn(
 
 def test_help_names_what_can_be_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "--help"]) == 0
-    out = capsys.readouterr().out
+    out = " ".join(capsys.readouterr().out.split())
     for words in (
         "[LATTICE.toml|FILE]",
         ".step, .stp, .stpz, .step.gz, .stp.gz, .brep, .stl",

@@ -208,7 +208,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         author: str = "",
         organisation: str = "",
     ) -> None:
-        """Write files; each path's ending chooses STEP (.step, .stp), BREP, STL, 3MF, OBJ or PLY.
+        """Write files; each path's ending chooses STEP (packed too: .stpz, .step.gz), BREP, STL, 3MF, OBJ or PLY.
 
         Every path and setting is checked before anything is built. A file appears whole or not at all. STEP, STL and
         3MF of whole patches are made straight from the control nets, without the kernel, and checked by the numbers of

@@ -205,7 +205,7 @@ def check_file(
     Parameters
     ----------
     path : path-like
-        Ending in .step, .stp, .brep, .stl, .3mf, .obj or .ply.
+        Ending in .step, .stp, .stpz, .step.gz, .stp.gz, .brep, .stl, .3mf, .obj or .ply.
     profile : {"default", "creo", "nx"}
         Limits of Creo's GeomIntegrityCHECK, or of CADdoctor for NX; by default the stricter of either, without those
         that the size of a lattice's cells decides.

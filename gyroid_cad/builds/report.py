@@ -72,9 +72,9 @@ class LatticeReport:
     wall                                0.8 mm, density 0.24517
     solids, faces                       1, 84 (valid and closed)
     boundary edges, non-manifold edges  36, 1
-    volume                              245.17085 mm3, +1.1e-08 of the exact one
-    area                                731.65157 mm2
-    deviation                           4.3e-05 mm, 0.034 degrees; 10 x 10 control points a patch
+    volume                              245.17085 mm3, +2.0e-08 of the exact one
+    area                                731.6526 mm2
+    deviation                           4.5e-05 mm, 0.023 degrees; 10 x 10 control points a patch
     """
 
     cells: tuple[int, int, int]

@@ -10,8 +10,8 @@ import numpy as np
 
 from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.choices import CheckedBy
-from gyroid_cad.common.files import replacing
 from gyroid_cad.common.memory import require_memory
+from gyroid_cad.common.packed import replacing_step
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import FitError
 from gyroid_cad.step.bodies import LEAST_GAP
@@ -96,7 +96,7 @@ class WholeBuild:
         """
         size = joint_size(self.sizes)
         for path in targets:
-            with self.timed(f"write {path.name}", progress), replacing(path) as temporary:
+            with self.timed(f"write {path.name}", progress), replacing_step(path) as temporary:
                 name = product_name(path)
                 part = StepPart(name, self.bodies, body_sizes=self.sizes)
                 write_products(temporary, name, [part], header=header, size=size)

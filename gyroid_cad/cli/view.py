@@ -56,7 +56,7 @@ def view(
     Parameters
     ----------
     what : Lattice or path-like
-        A file's ending says what it is: .step, .stp, .brep, .stl, .3mf, .obj or .ply.
+        A file's ending says what it is: .step, .stp, .stpz, .step.gz, .stp.gz, .brep, .stl, .3mf, .obj or .ply.
     picture : path-like, optional
         A .png file to draw into; no display is needed, and no window opened.
     progress : callable, optional
@@ -158,9 +158,10 @@ _TOML_ENDING = ".toml"
 )
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 def view_command(screenshot: str | None, quiet: bool, **given: Any) -> None:
-    """Show a lattice, or a .step, .stp, .brep, .stl, .3mf, .obj or .ply file, in CadQuery's viewer.
+    """Show a lattice, or a file of a shape or of triangles, in CadQuery's viewer.
 
     The lattice is described as for "build", by options or in a TOML file; no solid is built unless it is trimmed.
+    Files end in .step, .stp, .stpz, .step.gz, .stp.gz, .brep, .stl, .3mf, .obj or .ply.
     STEP files are shown in their own colours. In the window: drag to turn, wheel to zoom, q to leave.
 
     \b

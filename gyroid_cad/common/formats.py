@@ -28,6 +28,7 @@ __all__ = [
     "FORMATS",
     "GISMO",
     "GMSH",
+    "GZIPPED",
     "HTML",
     "JSON",
     "MESH_FORMATS",
@@ -46,6 +47,7 @@ __all__ = [
     "TRIANGLE_FORMATS",
     "VOLUME_FORMATS",
     "VTU",
+    "ZIPPED",
     "Format",
     "format_of",
     "listed_endings",
@@ -57,6 +59,7 @@ __all__ = [
     "require_output",
     "require_schema",
     "require_settings",
+    "stem_of",
 ]
 
 
@@ -78,7 +81,9 @@ class Format:
     holds: str
 
 
-STEP = Format("STEP", (".step", ".stp"), "solid")
+# Packed: in an archive of ZIP, and by gzip.
+ZIPPED, GZIPPED = ".stpz", (".step.gz", ".stp.gz")
+STEP = Format("STEP", (".step", ".stp", ZIPPED, *GZIPPED), "solid")
 BREP = Format("BREP", (".brep",), "solid")
 STL = Format("STL", (".stl",), "triangles")
 THREE_MF = Format("3MF", (".3mf",), "triangles")
@@ -130,9 +135,30 @@ def format_of(path: str | os.PathLike[str]) -> Format | None:
     --------
     >>> format_of("Bracket.STP").name
     'STEP'
+    >>> format_of("bracket.step.gz").name
+    'STEP'
     >>> format_of("bracket.dwg")
     """
-    return _OF_ENDING.get(Path(path).suffix.lower())
+    return _OF_ENDING.get(_ending_of(path))
+
+
+def stem_of(path: str | os.PathLike[str]) -> str:
+    """Return a file's name without the ending that says its format, or without its last one.
+
+    Examples
+    --------
+    >>> stem_of("folder/bracket.step.gz"), stem_of("bracket.v2.stp")
+    ('bracket', 'bracket.v2')
+    """
+    name = Path(path).name
+    return name.removesuffix(name[len(name) - len(_ending_of(path)) :]) or name
+
+
+def _ending_of(path: str | os.PathLike[str]) -> str:
+    """The ending of a file's name, in lower case: two where both say together what it is."""
+    suffixes = Path(path).suffixes
+    both = "".join(suffixes[-2:]).lower()
+    return both if both in _OF_ENDING else Path(path).suffix.lower()
 
 
 def listed_endings(formats: Sequence[Format]) -> str:
@@ -143,7 +169,7 @@ def listed_endings(formats: Sequence[Format]) -> str:
     >>> listed_endings(TRIANGLE_FORMATS)
     '.stl, .3mf, .obj or .ply'
     >>> listed_endings(PART_FORMATS)
-    '.step, .stp, .brep, .stl, .3mf, .obj or .ply'
+    '.step, .stp, .stpz, .step.gz, .stp.gz, .brep, .stl, .3mf, .obj or .ply'
     """
     *others, last = [ending for form in formats for ending in form.endings]
     return f"{', '.join(others)} or {last}" if others else last

@@ -96,9 +96,9 @@ class FillReport:
     kind           sheet, cells of 8 mm, wall 0.786642 mm
     smallest wall  0.786642 mm
     solids, faces  1, 30 (valid and closed)
-    volume         19.093981 mm3 of 64, density 0.29834
-    area           69.9694 mm2
-    islands        0 left, 2 dropped (0.1075 mm3)
+    volume         19.093472 mm3 of 64, density 0.29834
+    area           69.9646 mm2
+    islands        0 left, 2 dropped (0.1072 mm3)
     """
 
     kind: Kind

@@ -16,6 +16,7 @@ from OCP.TopoDS import TopoDS_Iterator, TopoDS_Shape
 
 from gyroid_cad.common.formats import BREP, STEP, Format, format_of
 from gyroid_cad.common.inputs import unreadable, utf8_named
+from gyroid_cad.common.packed import unpacked
 from gyroid_cad.common.processes import Started, started
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.assembly import read_bodies
@@ -111,11 +112,11 @@ def read_apart(path: str | os.PathLike[str], reader: Callable[[str], Contents]) 
     ExportError
         If the reader raises one, crashes, or does not come to an end.
     """
-    with TemporaryDirectory() as folder, utf8_named(path) as known:
+    with TemporaryDirectory() as folder, unpacked(path) as text, utf8_named(text) as known:
         # A program that was packed into one file has no Python to start.
         if getattr(sys, "frozen", False):
             return reader(known)
-        _run(path, started(answer, reader.__module__, reader.__name__, known, folder))
+        _run(path, text, started(answer, reader.__module__, reader.__name__, known, folder))
         if Path(folder, _PROBLEM).exists():
             problem = Path(folder, _PROBLEM).read_text(encoding="utf-8")
             raise ExportError(problem.replace(known, str(path)))
@@ -135,9 +136,9 @@ def answer(module: str, reader: str, known: str, folder: str) -> None:
         Path(folder, _PROBLEM).write_text(str(failed), encoding="utf-8")
 
 
-def _run(path: str | os.PathLike[str], process: Started) -> None:
-    """Wait for a process that reads a file: longer, the larger that is."""
-    allowed = SECONDS_AT_LEAST + SECONDS_PER_MB * Path(path).stat().st_size / 1e6
+def _run(path: str | os.PathLike[str], text: Path, process: Started) -> None:
+    """Wait for a process that reads a file: longer, the larger its text is."""
+    allowed = SECONDS_AT_LEAST + SECONDS_PER_MB * text.stat().st_size / 1e6
     try:
         status = process.wait(allowed)
     finally:
@@ -169,7 +170,7 @@ def require_cad_file(path: str | os.PathLike[str]) -> Format:
     form = format_of(path) or STEP
     if form not in _MARKS:
         raise ExportError(f"{path} could not be read: it is {form.name} by its ending, where STEP or BREP is needed")
-    with open(path, "rb") as file:
+    with unpacked(path) as text, text.open("rb") as file:
         if _MARKS[form] not in file.read(_HEADER_BYTES).upper():
             raise ExportError(f"{path} could not be read as {form.name}: it does not begin as such a file does")
     return form

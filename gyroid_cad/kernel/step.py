@@ -21,8 +21,8 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_FORWARD, TopAbs_ShapeEnum, TopAbs_SOL
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Shape
 
-from gyroid_cad.common.files import replacing
 from gyroid_cad.common.formats import require_schema
+from gyroid_cad.common.packed import replacing_step
 from gyroid_cad.errors import ExportError
 from gyroid_cad.kernel.check import parts_of, topology
 from gyroid_cad.kernel.compat import NumberedShapes
@@ -133,7 +133,7 @@ def write_parts(
     ------
     ExportError
     """
-    with replacing(path) as temporary:
+    with replacing_step(path) as temporary:
         write_products(temporary, product, parts, places, header, size)
         _require_whole(path, temporary, shape)
 
@@ -147,7 +147,7 @@ def _write_by_kernel(shape: TopoDS_Shape, path: str | os.PathLike[str], header: 
         "write.step.product.name": product,
         "write.surfacecurve.mode": 1,
     }
-    with replacing(path) as temporary:
+    with replacing_step(path) as temporary:
         with no_messages(), _kernel_settings(settings):
             writer = STEPControl_Writer()
             if writer.Transfer(shape, STEPControl_AsIs) != IFSelect_RetDone:

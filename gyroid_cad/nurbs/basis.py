@@ -17,10 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "basis",
+    "border_rates",
     "component_images",
     "gauss_points",
     "greville",
     "images",
+    "inner_controls",
+    "least_change",
     "orders",
     "quotients",
     "rational_basis",
@@ -28,6 +31,7 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
 Order = tuple[int, ...]
 
 # Of rows, columns and length of a product.
@@ -202,6 +206,49 @@ def rational_basis(weights: Floats, knots: tuple[Floats, ...], places: Floats, o
     return np.stack(list(quotients(values, sums).values()))
 
 
+def border_rates(weights: Floats, knots: Floats, along: Floats) -> tuple[Floats, Floats]:
+    """Rates of a surface at its border, on the square [-1, 1]^2, as matrices on control points.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n, n)
+    knots : ndarray
+        Along u as along v.
+    along : ndarray, shape (q,)
+        Places on each border curve, in running order round the square.
+
+    Returns
+    -------
+    running, inward : ndarray, shape (4, q, n * n)
+        The way the border runs, and from there into the square: their vector product is along du x dv.
+
+    Examples
+    --------
+    >>> running, inward = border_rates(np.ones((4, 4)), uniform_knots(4), np.array([-1.0, 0.0]))
+    >>> net = np.stack(np.meshgrid(*2 * [np.linspace(-1, 1, 4)], indexing="ij"), axis=-1).reshape(-1, 2)
+    >>> (running @ net)[:, 0].round(9).tolist(), (inward @ net)[:, 0].round(9).tolist()
+    ([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]])
+    """
+    ones = np.ones_like(along)
+    borders = ((along, -ones), (ones, along), (-along, ones), (-ones, -along))
+    running, inward = [], []
+    for k, (u, v) in enumerate(borders):
+        _, by_u, by_v = rational_basis(weights, (knots, knots), np.stack([u, v], axis=-1), 1)
+        running.append((by_u, by_v, -by_u, -by_v)[k])
+        inward.append((by_v, -by_u, -by_v, by_u)[k])
+    return np.stack(running), np.stack(inward)
+
+
+def inner_controls(count: int, rows: int = 1) -> Booleans:
+    """Mask of the control points inside so many outer rows; shape (count * count,).
+
+    Inside one, none moves a border curve; inside two, none turns a tangent plane there.
+    """
+    inner = np.zeros((count, count), dtype=bool)
+    inner[rows:-rows, rows:-rows] = True
+    return inner.ravel()
+
+
 def images(matrix: Floats, controls: Floats) -> Floats:
     """Points of many surfaces: products of one matrix of basis functions with the control points of each.
 
@@ -239,3 +286,41 @@ def component_images(matrix: Floats, controls: Floats) -> Floats:
             part = slice(first, first + _ROWS_AT_ONCE)
             np.matmul(rows[part], columns, out=found[part, start : start + wide])
     return found.reshape(components, count, len(matrix))
+
+
+def least_change(
+    responses: Floats, rates: Floats, normals: Floats, wanted: Floats, firmness: float | None = None
+) -> Floats:
+    """Least change of control points by which rates get the wanted parts along normals.
+
+    Two surfaces with a border curve in common meet smoothly where the rates X_w from there inwards have no part along
+    one normal m, ``m . X_w = 0``, which is linear in the control points. With x the change, it is the minimum of
+    ``x . gram x`` under ``m . (rates x) = wanted``, by Lagrange multipliers: points of the surface move least in the
+    mean square. With a finite firmness what is missed is a penalty, and there may be more conditions than can be met.
+
+    Parameters
+    ----------
+    responses : ndarray, shape (k, q)
+        Inverse of the Gram matrix of the basis functions, times ``rates`` transposed.
+    rates : ndarray, shape (q, k)
+        On the control points that may move.
+    normals : ndarray, shape (..., q, 3)
+    wanted : ndarray, shape (..., q)
+    firmness : float, optional
+        Weight of the penalty, in units of the mean compliance; conditions are met exactly if left out.
+
+    Returns
+    -------
+    ndarray, shape (..., k, 3)
+
+    Examples
+    --------
+    >>> least_change(np.ones((2, 1)), np.ones((1, 2)), np.array([[0.0, 0.0, 1.0]]), np.array([3.0])).tolist()
+    [[0.0, 0.0, 1.5], [0.0, 0.0, 1.5]]
+    """
+    compliance = rates @ responses
+    system = compliance * (normals @ np.swapaxes(normals, -1, -2))
+    if firmness is not None:
+        system += np.eye(len(rates)) * (np.trace(compliance) / len(rates) / firmness)
+    multipliers = np.linalg.solve(system, wanted[..., np.newaxis])
+    return np.asarray(responses @ (multipliers * normals))

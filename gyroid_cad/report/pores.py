@@ -25,6 +25,7 @@ from gyroid_cad.wall.distances import WallFaces, tree_of, wall_faces
 from gyroid_cad.wall.fitted import FittedWall
 from gyroid_cad.wall.offset import Wall
 from gyroid_cad.wall.refit import graded_wall
+from gyroid_cad.wall.tangency import smoothed
 
 __all__ = ["CONTINUED", "ENDLESS", "OPEN_SIDED", "ChannelSpheres", "Pores", "inscribed_spheres", "pores_of"]
 
@@ -212,7 +213,7 @@ def _continued(fitted: FittedWall) -> Wall:
     complex = build_complex((nx, ny, nz), placements, grading.closed, first=(x, y, z), wanted=near)
     ends = (-_REACH * grading.cell_size, (cells + _REACH) * grading.cell_size)
     held = replace(grading, thickness=_held(grading.thickness, *ends), density=_held(grading.density, *ends))
-    return graded_wall(complex, held, len(fitted.wall.weights))
+    return smoothed(graded_wall(complex, held, len(fitted.wall.weights)))
 
 
 def _held(value: float | Field | None, low: float, high: Floats) -> float | Field | None:

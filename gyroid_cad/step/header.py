@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 from unicodedata import category
 
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import require_schema
+from gyroid_cad.common.formats import require_schema, stem_of
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.step.text import quoted
 from gyroid_cad.version import __version__
@@ -72,7 +71,7 @@ def header_section(name: str, header: StepHeader, schema: str) -> str:
 
 def product_name(path: str | os.PathLike[str], name: str | None = None) -> str:
     """The name, or the file's stem; what is no text in it is replaced."""
-    wanted = Path(path).stem if name is None else name
+    wanted = stem_of(path) if name is None else name
     return "".join(letter if _is_text(letter) else "_" for letter in wanted)
 
 

@@ -1,30 +1,36 @@
 """Least-squares fit of the semi-fundamental patch by a NURBS surface: the paper's eqs. (11) to (13).
 
 Points and unit normals are fitted in one basis, so that the faces of a wall of thickness t are the
-control nets ``P +- t/2 N``. In the smooth parameterisation the corners are interpolated, then each edge
-is fitted from its own samples alone, then the interior: an edge's control points depend on nothing but
-the edge, so two patches that meet there get the same ones.
+control nets ``P +- t/2 N``. In the smooth parameterisation an edge's control points depend on nothing but the edge, so
+two patches that meet there get the same ones, and tangent planes along it are the exact surface's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from math import ceil
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import dot
 from gyroid_cad.errors import FitError, ParameterError
-from gyroid_cad.nurbs.basis import gauss_points, rational_basis, uniform_knots
+from gyroid_cad.nurbs.basis import (
+    border_rates,
+    gauss_points,
+    inner_controls,
+    least_change,
+    rational_basis,
+    uniform_knots,
+)
 from gyroid_cad.nurbs.surface import NurbsSurface, edge_row, first_fold, layer_areas
 from gyroid_cad.surface.patch import (
     EDGE_HALF_TURN,
     PARAMETERISATIONS,
     ROTOINVERSION,
     edge_half_turn_shift,
-    parameter_corners,
 )
 from gyroid_cad.surface.weierstrass import GYROID, Family
 
@@ -33,19 +39,16 @@ __all__ = [
     "FitSettings",
     "FittedPatch",
     "edge_gap",
-    "error_within_reach",
     "fit_patch",
     "max_offset",
-    "more_control_points",
     "require_shared_edges",
 ]
 
 Floats = NDArray[np.float64]
+Exact = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 DEGREE = 3
 FEWEST_CONTROL_POINTS, MOST_CONTROL_POINTS = 4, 40
-# The error of a cubic fit falls with the fourth power of the number of spans; a little more than needed is taken.
-_ORDER, _SURPLUS = 4, 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +120,6 @@ class FitSettings:
         return np.ones((self.control_points,) * 2) if self.weights is None else np.array(self.weights)
 
 
-def error_within_reach(control_points: int, error: float) -> float:
-    """About the error of the finest fit, where one of so many control points, six or more, has ``error``."""
-    return error * ((control_points - DEGREE) / (MOST_CONTROL_POINTS - DEGREE)) ** _ORDER
-
-
-def more_control_points(control_points: int, excess: float) -> int:
-    """Number of control points to try next, where the error of a fit is ``excess`` times what it may be."""
-    wanted = DEGREE + (control_points - DEGREE) * (_SURPLUS * excess) ** (1 / _ORDER)
-    return int(min(max(control_points + 1, ceil(wanted)), MOST_CONTROL_POINTS))
-
-
 def _validated_knots(knots: tuple[float, ...], control_points: int) -> tuple[float, ...]:
     accepted = (
         f"{control_points + DEGREE + 1} non-decreasing numbers, four times -1, four times 1 "
@@ -164,6 +156,17 @@ def _validated_weights(weights: tuple[tuple[float, ...], ...], control_points: i
 EDGE_GAP_LIMIT = 1e-12
 _SAMPLES_PER_SPAN = 4
 _CLOUD_RADII = 48
+# Places on an edge at which its tangent plane is asked for, by control points; and how firmly, against the samples:
+# more so, the inner control points wander along the surface.
+_PLACES_PER_CONTROL_POINT = 2
+_FIRMNESS = 1e3
+# With fewer control points a side there are none to spare: turned, the fit gets further off than it gains.
+_FEWEST_TO_TURN = 6
+# Offset, in bounding-cell lengths, about which the two faces of a wall get the tangent planes: of walls a tenth of the
+# cell size thick.
+_OFFSET = 0.1
+# The integral of the Gaussian curvature over the patch: its normals cover a sixth of the sphere.
+_TOTAL_CURVATURE = -4 * np.pi / 6
 # Odd, so that the patch's centre, where it curves most, is among them.
 _FOLD_SAMPLES = 97
 _OURS = FitSettings()
@@ -209,9 +212,9 @@ def fit_patch(settings: FitSettings = _OURS, family: Family = GYROID) -> FittedP
     -------
     FittedPatch
     """
-    fit = _fit_cloud if settings.parameterisation == "polar" else _fit_staged
-    net = fit(settings, family)
     knots, weights = settings.knot_vector(), settings.weight_net()
+    fit = _cloud_net if settings.parameterisation == "polar" else _staged_net
+    net = fit(knots, weights, partial(PARAMETERISATIONS[settings.parameterisation], family=family))
     surface, normals = (NurbsSurface(net[..., part], weights, knots, knots) for part in (slice(3), slice(3, 6)))
     return FittedPatch(settings, family, surface, normals)
 
@@ -269,52 +272,115 @@ def _gap(surface: NurbsSurface, shift: Floats, turned_over: float = 1.0) -> floa
     return float(max(np.max(np.linalg.norm(edge - image, axis=1)) for edge in edges for image in images))
 
 
-def _fit_staged(settings: FitSettings, family: Family) -> Floats:
+def _staged_net(knots: Floats, weights: Floats, exact: Exact) -> Floats:
     """Corners, then edges, then interior; returns the net of (point, normal), shape (n, n, 6)."""
-    n, knots, weights = settings.control_points, settings.knot_vector(), settings.weight_net()
-    exact = partial(PARAMETERISATIONS[settings.parameterisation], family=family)
+    net = np.zeros((*weights.shape, 6))
     samples, sample_weights = gauss_points(knots, _SAMPLES_PER_SPAN)
-    net = np.zeros((n, n, 6))
-    for k, (u, v) in enumerate(parameter_corners()):
-        edge_row(net, k)[0] = np.concatenate(exact(u, v), axis=-1)
-    ones = np.ones_like(samples)
-    square = ((samples, -ones), (ones, samples), (-samples, ones), (-ones, -samples))
-    for k, (u, v) in enumerate(square):
-        rational = rational_basis(edge_row(weights, k), (knots,), samples[:, np.newaxis])[0]
-        row = edge_row(net, k)
-        known = rational[:, [0, -1]] @ row[[0, -1]]
-        row[1:-1] = _least_squares(rational[:, 1:-1], np.concatenate(exact(u, v), axis=-1) - known, sample_weights)
-    inner = np.zeros((n, n), dtype=bool)
-    inner[1:-1, 1:-1] = True
+    for k, corner in enumerate(_round_the_border(exact, np.array([-1.0]))):
+        edge_row(net, k)[0] = corner
+    for k, values in enumerate(_round_the_border(exact, samples)):
+        _fit_edge(edge_row(net, k), edge_row(weights, k), knots, (samples, sample_weights), values)
+
+    inner = inner_controls(len(weights))
+    flat = net.reshape(-1, 6)
     places = np.stack(np.meshgrid(samples, samples, indexing="ij"), axis=-1).reshape(-1, 2)
     rational = rational_basis(weights, (knots, knots), places)[0]
-    known = rational[:, ~inner.ravel()] @ net[~inner]
-    u, v = samples[:, np.newaxis], samples[np.newaxis]
-    wanted = np.concatenate(exact(u, v), axis=-1).reshape(-1, 6) - known
     quadrature = np.outer(sample_weights, sample_weights).ravel()
-    rational = rational[:, inner.ravel()]
-    net[inner] = _least_squares(rational, wanted, quadrature)
-
-    derivatives = NurbsSurface(net[..., :3], weights, knots, knots).derivatives(u, v)
-    area = np.cross(derivatives[1, 0], derivatives[0, 1]).reshape(-1, 3)
-    net[inner, 3:] += _missing_normals(rational, quadrature, area, (known + rational @ net[inner])[:, 3:])
+    wanted = np.concatenate(exact(*places.T), axis=-1) - rational[:, ~inner] @ flat[~inner]
+    along = np.linspace(-1, 1, _PLACES_PER_CONTROL_POINT * len(weights))
+    running, inward = (rates.reshape(-1, len(flat)) for rates in border_rates(weights, knots, along))
+    found = _least_squares(rational[:, inner], quadrature, wanted, inward[:, inner].T)
+    flat[inner], responses = found[:, :6], found[:, 6:]
+    if len(weights) >= _FEWEST_TO_TURN:
+        normals = np.concatenate(_round_the_border(exact, along))[:, 3:]
+        _turn_to_exact(flat, inner, (running, inward, responses), normals)
+    _carry_whole_layers(net, knots, weights, rational, quadrature)
     return net
 
 
-def _missing_normals(rational: Floats, quadrature: Floats, area: Floats, normals: Floats) -> Floats:
-    """Correction to the normals' inner control points that makes them carry the surface's whole area.
+def _round_the_border(exact: Exact, along: Floats) -> list[Floats]:
+    """Exact points and normals along each edge, in running order; shape (q, 6) each."""
+    ones = np.ones_like(along)
+    u, v = np.concatenate([along, ones, -along, -ones]), np.concatenate([-ones, along, ones, -along])
+    return np.split(np.concatenate(exact(u, v), axis=-1), 4)
 
-    Least squares leave the sum of N . dA short by 7.5e-7 of the area at 10 x 10, and every wall's volume with
-    it. The missing part is spread along the area vectors; edges, which neighbours share, keep theirs.
+
+def _least_squares(functions: Floats, sample_weights: Floats, wanted: Floats, *beside: Floats) -> Floats:
+    """Eqs. (12), (13), with one weight a sample, (R^T W R)^-1 R^T W S; beside it (R^T W R)^-1 of other columns."""
+    weighted = functions.T * sample_weights
+    return np.asarray(np.linalg.solve(weighted @ functions, np.hstack([weighted @ wanted, *beside])))
+
+
+def _fit_edge(row: Floats, weights: Floats, knots: Floats, samples: tuple[Floats, Floats], values: Floats) -> None:
+    """The inner control points of an edge, which at its ends keeps to the corners' tangent planes, as all edges do."""
+    rational = rational_basis(weights, (knots,), samples[0][:, np.newaxis])[0]
+    rates = rational_basis(weights, (knots,), np.array([[-1.0], [1.0]]), 1)[1]
+    wanted = values - rational[:, [0, -1]] @ row[[0, -1]]
+    found = _least_squares(rational[:, 1:-1], samples[1], wanted, rates[:, 1:-1].T)
+    row[1:-1], responses = found[:, :6], found[:, 6:]
+    if len(row) < _FEWEST_TO_TURN:
+        return
+    corner_normals = row[[0, -1], 3:].copy()
+    for part in (slice(3), slice(3, 6)):
+        off = -dot(rates @ row[:, part], corner_normals)
+        row[1:-1, part] += least_change(responses, rates[:, 1:-1], corner_normals, off)
+
+
+def _turn_to_exact(
+    flat: Floats, inner: NDArray[np.bool_], borders: tuple[Floats, Floats, Floats], exact_normals: Floats
+) -> None:
+    """Turn the tangent planes along the edges of points P, and of P + h N to first order in h, to the exact ones.
+
+    Edges are a little off themselves, so that no surface with such an edge has quite the exact normal: the nearest
+    direction that is perpendicular to the edge is taken. Neighbours, who share it, take the same one.
     """
-    spread = _least_squares(rational, area, quadrature)
-    shortage = quadrature @ (np.linalg.norm(area, axis=1) - np.sum(normals * area, axis=1))
-    return np.asarray(spread * (shortage / (quadrature @ np.sum(rational @ spread * area, axis=1))))
+    running, inward, responses = borders
+    tangent, tangent_rate = running @ flat[:, :3], running @ flat[:, 3:]
+
+    def normals(offset: float) -> Floats:
+        edge = tangent + offset * tangent_rate
+        along = dot(exact_normals, edge) / dot(edge, edge)
+        return np.asarray(exact_normals - along[:, np.newaxis] * edge)
+
+    def turn(part: slice, towards: Floats, wanted: Floats) -> None:
+        off = wanted - dot(inward @ flat[:, part], towards)
+        flat[inner, part] += least_change(responses, inward[:, inner], towards, off, _FIRMNESS)
+
+    turn(slice(3), normals(0.0), np.zeros(len(inward)))
+    below, above = normals(-_OFFSET), normals(_OFFSET)
+    turn(slice(3, 6), (above + below) / 2, -dot(inward @ flat[:, :3], (above - below) / (2 * _OFFSET)))
 
 
-def _fit_cloud(settings: FitSettings, family: Family) -> Floats:
+def _carry_whole_layers(net: Floats, knots: Floats, weights: Floats, rational: Floats, quadrature: Floats) -> None:
+    """Correct the normals so that they carry the surface's whole area, and its whole curvature.
+
+    The layer between P - h N and P + h N has the volume ``2 h A + 2/3 h^3 C`` with A the sum of N . dA and C that of
+    N . (N_u x N_v) du dv. Least squares leave A short by 7.5e-7 of the area at 10 x 10, and every wall's volume with
+    it. What is missing is spread along both vectors of area, where no tangent plane at an edge is turned by it.
+    """
+    samples = gauss_points(knots, _SAMPLES_PER_SPAN)[0]
+    rates, turns = (
+        NurbsSurface(net[..., part], weights, knots, knots).derivatives(samples[:, np.newaxis], samples[np.newaxis])
+        for part in (slice(3), slice(3, 6))
+    )
+    normals = turns[0, 0].reshape(-1, 3)
+    vectors = [np.cross(d[1, 0], d[0, 1]).reshape(-1, 3) for d in (rates, turns)]
+    area, curvature = vectors
+    missing = [
+        quadrature @ (np.linalg.norm(area, axis=1) - dot(normals, area)),
+        _TOTAL_CURVATURE - quadrature @ dot(normals, curvature),
+    ]
+    free = inner_controls(len(weights), 2 if len(weights) > _FEWEST_TO_TURN else 1)
+    functions = rational[:, free]
+    spread = _least_squares(functions, quadrature, np.hstack(vectors)).reshape(-1, 2, 3)
+    ways = np.tensordot(functions, spread, axes=1)
+    # C is of third degree in the normals: its rate is three times that of the one factor.
+    effect = [times * quadrature @ dot(ways, v[:, np.newaxis]) for times, v in zip((1, 3), vectors, strict=True)]
+    net.reshape(-1, 6)[free, 3:] += np.tensordot(np.linalg.solve(effect, missing), spread, axes=(0, 1))
+
+
+def _cloud_net(knots: Floats, weights: Floats, exact: Exact) -> Floats:
     """All control points at once, from a cloud even in radius and angle (Fig. 5); shape (n, n, 6)."""
-    n, knots = settings.control_points, settings.knot_vector()
     radius = np.arange(1, _CLOUD_RADII + 1) / _CLOUD_RADII
     along = np.linspace(-1, 1, _CLOUD_RADII, endpoint=False)
     ones = np.ones_like(along)
@@ -322,12 +388,6 @@ def _fit_cloud(settings: FitSettings, family: Family) -> Floats:
     border_v = np.concatenate([-ones, along, ones, -along])
     u = np.append(np.outer(radius, border_u).ravel(), 0.0)
     v = np.append(np.outer(radius, border_v).ravel(), 0.0)
-    rational = rational_basis(settings.weight_net(), (knots, knots), np.stack([u, v], axis=-1))[0]
-    samples = np.concatenate(PARAMETERISATIONS[settings.parameterisation](u, v, family), axis=-1)
-    return _least_squares(rational, samples, np.ones(len(u))).reshape(n, n, 6)
-
-
-def _least_squares(rows: Floats, wanted: Floats, sample_weights: Floats) -> Floats:
-    """Eqs. (12), (13), with one weight a sample: (R^T W R)^-1 R^T W S."""
-    weighted = rows.T * sample_weights
-    return np.asarray(np.linalg.solve(weighted @ rows, weighted @ wanted), dtype=float)
+    rational = rational_basis(weights, (knots, knots), np.stack([u, v], axis=-1))[0]
+    samples = np.concatenate(exact(u, v), axis=-1)
+    return _least_squares(rational, np.ones(len(u)), samples).reshape(*weights.shape, 6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import ceil
 
 import numpy as np
 
@@ -17,14 +18,12 @@ from gyroid_cad.surface.fit import (
     FitSettings,
     FittedPatch,
     edge_gap,
-    error_within_reach,
     fit_patch,
-    more_control_points,
 )
 from gyroid_cad.surface.patch import PARAMETERISATIONS, parameter_corners
 from gyroid_cad.surface.weierstrass import GYROID, Family
 
-__all__ = ["FitReport", "fit_report", "fit_within"]
+__all__ = ["FitReport", "error_within_reach", "fit_report", "fit_within", "more_control_points"]
 
 _REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
@@ -33,6 +32,8 @@ _FOOT_POINT_STEPS = 4
 _HOPELESS = 10
 # Less than this is rounding, of which the digits differ from machine to machine.
 _ROUNDING = 1e-15
+# The error of a cubic fit falls with the fourth power of the number of spans; a little more than needed is taken.
+_ORDER, _SURPLUS = 4, 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,3 +128,14 @@ def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID)
             raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
         settings = replace(settings, control_points=more_control_points(n, reached / tolerance))
     return settings
+
+
+def error_within_reach(control_points: int, error: float) -> float:
+    """About the error of the finest fit, where one of so many control points, six or more, has ``error``."""
+    return error * ((control_points - DEGREE) / (MOST_CONTROL_POINTS - DEGREE)) ** _ORDER
+
+
+def more_control_points(control_points: int, excess: float) -> int:
+    """Number of control points to try next, where the error of a fit is ``excess`` times what it may be."""
+    wanted = DEGREE + (control_points - DEGREE) * (_SURPLUS * excess) ** (1 / _ORDER)
+    return int(min(max(control_points + 1, ceil(wanted)), MOST_CONTROL_POINTS))

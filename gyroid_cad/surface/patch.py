@@ -193,6 +193,7 @@ def _edge_chart(sigma: Floats, family: Family) -> tuple[Floats, Floats]:
 
 def _plan(u: Floats, v: Floats, family: Family) -> Floats:
     """Place of (u, v) in the view along the patch's axis (x, y of the Weierstrass frame)."""
+    u, v = (_shifted(parameter, family) for parameter in (u, v))
     parameters, inverse = np.unique(np.concatenate([u, v, -u, -v]), return_inverse=True)
     edge = _edge(parameters, family)
     at_u, at_v, at_minus_u, at_minus_v = edge[inverse].reshape(4, -1, 3)
@@ -210,6 +211,13 @@ def _plan(u: Floats, v: Floats, family: Family) -> Floats:
     radial, cubic = family.interior_shift
     shift = size * (1 - u * u) * (1 - v * v) * (radial * position + cubic * np.conj(position) ** 3)
     return np.asarray(plan + np.stack([shift.real, shift.imag], axis=-1))
+
+
+def _shifted(along: Floats, family: Family) -> Floats:
+    """The family's odd shift of a parameter, which keeps the ends and is the same run backwards."""
+    squared = along * along
+    linear, cubic = family.edge_shift
+    return np.asarray(along + along * (1 - squared) * (linear + cubic * squared))
 
 
 def _lift(plan: Floats, family: Family) -> tuple[Floats, Floats]:

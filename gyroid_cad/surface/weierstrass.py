@@ -77,19 +77,26 @@ class Family:
         The normalization factor (the paper's kappa), in units of the bounding-cell length, half the period.
     interior_shift : tuple of complex
         How the smooth parameterisation shifts the patch's interior; see :func:`gyroid_cad.surface.patch.smooth`.
+    edge_shift : tuple of float
+        How it shifts places along the edges.
     """
 
     name: str
     bonnet_angle: float
     scale: float
     interior_shift: tuple[complex, complex] = (0.0, 0.0)
+    edge_shift: tuple[float, float] = (0.0, 0.0)
 
 
 # Scales at which the patch's corners fall on the grid of quarters of the bounding-cell length.
 GYROID = Family(
-    "gyroid", atan2(K, K_PRIME), sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME), (0.026304372, -0.017536248j)
+    "gyroid",
+    atan2(K, K_PRIME),
+    sqrt(K * K + K_PRIME * K_PRIME) / (K * K_PRIME),
+    (0.0386, -0.0142j),
+    (-0.0014, 0.0045),
 )
-DIAMOND = Family("diamond", 0.0, 1 / K, (0.0622, -0.0133))
+DIAMOND = Family("diamond", 0.0, 1 / K, (0.0676, -0.0148), (-0.0105, 0.0004))
 PRIMITIVE = Family("primitive", pi / 2, 2 / K_PRIME, (0.005, 0.01))
 
 

@@ -19,6 +19,7 @@ from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall, build_wall
 from gyroid_cad.wall.refit import Refit, graded_wall, likely_control_points, measured
 from gyroid_cad.wall.self_intersection import CLEARANCE_SAMPLES, FOLD_SAMPLES, require_simple, require_simple_fit
+from gyroid_cad.wall.tangency import smoothed
 
 __all__ = ["HOME", "FittedWall", "LatticeSpec", "fit_spec", "fit_wall", "fitted_wall"]
 
@@ -69,7 +70,7 @@ def fit_wall(
         n = wanted
         allow(n)
         with timed("fit"):
-            wall = graded_wall(complex, grading, n)
+            wall = smoothed(graded_wall(complex, grading, n))
         with timed("deviation"):
             refit = measured(wall.nets, complex, grading)
         wanted = refit.control_points_for(tolerance, grading.cell_size)

@@ -17,7 +17,8 @@ from gyroid_cad.common.arrays import dot, unit
 from gyroid_cad.errors import FitError, ParameterError
 from gyroid_cad.nurbs.basis import basis, uniform_knots
 from gyroid_cad.nurbs.surface import edge_row
-from gyroid_cad.surface.fit import DEGREE, MOST_CONTROL_POINTS, more_control_points
+from gyroid_cad.surface.fit import DEGREE, MOST_CONTROL_POINTS
+from gyroid_cad.surface.fit_report import more_control_points
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.distances import met_along_normals
 from gyroid_cad.wall.exact import offset_patches
@@ -138,7 +139,7 @@ def likely_control_points(complex: CellComplex, grading: Grading, least: int, to
 
 
 def graded_wall(complex: CellComplex, grading: Grading, control_points: int) -> Wall:
-    """Fit every patch's two faces with so many control points a side.
+    """Fit every patch's two faces with so many control points a side, each by itself.
 
     Raises
     ------

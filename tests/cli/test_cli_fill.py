@@ -129,7 +129,8 @@ def test_the_bare_surface_is_refused_as_triangles_before_anything_is_filled(caps
     done = run(capsys, block, "-o", block.with_name("a.stl"), *FILL, "--kind", "surface", "--route", "brep")
     assert done.status == 2
     assert done.err.splitlines() == [
-        f"gyroid-cad: error: -o = '{block.with_name('a.stl')}': expected a file name ending in .step, .stp or .brep"
+        f"gyroid-cad: error: -o = '{block.with_name('a.stl')}': expected a file name "
+        "ending in .step, .stp, .stpz, .step.gz, .stp.gz or .brep"
     ]
 
 

@@ -34,7 +34,7 @@ def test_a_file_is_of_its_ending_s_format_however_it_is_spelled(form: Format, tm
         assert format_of(f"a.b{ending}") is format_of(tmp_path / f"A{ending.upper()}") is form
 
 
-@pytest.mark.parametrize("path", ["part", "part.dwg", ".step", "part.step.gz", "folder.stl/part", ""])
+@pytest.mark.parametrize("path", ["part", "part.dwg", ".step", "part.stl.gz", "part.gz", "folder.stl/part", ""])
 def test_other_names_are_of_no_format(path: str) -> None:
     assert format_of(path) is None
 

@@ -106,10 +106,21 @@ def test_the_neighbour_goes_on_with_the_same_normals(along: float) -> None:
 @given(SQUARE)
 def test_the_border_of_the_smooth_patch_is_the_exact_edge_turned_round(along: float) -> None:
     sides = {3: (-1, -along), 0: (along, -1), 1: (1, along), 2: (-along, 1)}
-    edge = exact_edge(along)
-    for k in (3, 0, 1, 2):
-        np.testing.assert_allclose(smooth(*sides[k])[0], edge, rtol=0, atol=1e-13)
-        edge = ROTOINVERSION @ edge
+    start, end = exact_edge([-1.0, 1.0])
+    places = []
+    for turns, k in enumerate((3, 0, 1, 2)):
+        point = smooth(*sides[k])[0] @ np.linalg.matrix_power(ROTOINVERSION, turns)
+        places.append(2 * (point - start) @ (end - start) / ((end - start) @ (end - start)) - 1)
+        np.testing.assert_allclose(point, exact_edge(places[-1]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(places, places[0], rtol=0, atol=1e-13)
+
+
+def test_places_on_the_border_are_the_same_run_backwards_and_keep_their_order() -> None:
+    along = np.linspace(-1, 1, 41)
+    start, end = exact_edge([-1.0, 1.0])
+    places = 2 * (smooth(-1, -along)[0] - start) @ (end - start) / ((end - start) @ (end - start)) - 1
+    np.testing.assert_allclose(places, -places[::-1], rtol=0, atol=1e-13)
+    assert np.diff(places).min() > 0.9 * (along[1] - along[0])
 
 
 def test_edge_3_is_parameterised_by_the_coordinate_along_its_chord() -> None:

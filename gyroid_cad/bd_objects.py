@@ -140,7 +140,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         openings: Sequence[Any] = (),
         core: Any = None,
         mode: Mode = Mode.REPLACE,
-        origin: Point = (0.0, 0.0, 0.0),
+        origin: Point | None = None,
         rotation: Point = (0.0, 0.0, 0.0),
         fit: FitSettings | None = None,
         drop_islands: bool = False,

@@ -110,7 +110,7 @@ def gyroid_fill(
     skin: float | None = None,
     openings: Sequence[Any] = (),
     core: Any = None,
-    origin: Point = (0.0, 0.0, 0.0),
+    origin: Point | None = None,
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
     drop_islands: bool = False,

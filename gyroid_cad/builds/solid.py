@@ -25,6 +25,7 @@ from gyroid_cad.kernel.stl import closed_triangles, write_meshed_stl
 from gyroid_cad.kernel.trimmed import build_trimmed
 from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.step.header import StepHeader
+from gyroid_cad.step.products import UNLABELLED, BodyLabels
 from gyroid_cad.trim.box import Box, cut_to_box
 from gyroid_cad.trim.islands import Islands, island_rule, islands_of, kept_pieces
 from gyroid_cad.wall.areas import ShapeSize, joint_size, piece_sizes
@@ -202,9 +203,9 @@ def write_shape(
     header: StepHeader,
     deviation: float,
     angle: float,
-    names: Sequence[str] = (),
+    labels: BodyLabels = UNLABELLED,
 ) -> None:
-    """Write a shape, whose solids' sizes are known, and what they are called, in the format of the path's ending.
+    """Write a shape, whose solids' sizes are known, and how they are labelled, in the format of the path's ending.
 
     Raises
     ------
@@ -213,7 +214,7 @@ def write_shape(
 
     form = format_of(path)
     if form is STEP:
-        write_step(shape, path, header, sizes=sizes, body_names=names)
+        write_step(shape, path, header, sizes=sizes, labels=labels)
     elif form is BREP:
         write_brep(shape, path)
     elif form is STL:

@@ -55,7 +55,7 @@ from gyroid_cad.step.header import StepHeader
 __all__ = ["fill_command"]
 
 BREP, TRIANGLES = ROUTES
-SURFACE = KINDS[-1]
+BODIES, SURFACE = KINDS[-2:]
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
     *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
@@ -107,8 +107,8 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "--opening",
     multiple=True,
     metavar="FACE",
-    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; "
-    "may be repeated.",
+    help="Leave the skin open at a face: >Z, <X and the like for the one furthest that way, or a point X,Y,Z on it; of "
+    "bodies for one fluid, as a:>Z or b:<X; may be repeated.",
 )
 @click.option(
     "--core",
@@ -218,6 +218,8 @@ def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
     """
     formats = {format_of(path) for path in output}
     route: Route = given["route"] or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
+    if given["kind"] == BODIES:
+        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
     if route == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         return route
@@ -268,9 +270,11 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
 
 
-def _face(opening: str) -> str | list[float]:
-    """A selector as it stands, or the coordinates of a point."""
+def _face(opening: str) -> str | list[float] | tuple[str, list[float]]:
+    """A selector as it stands, or the coordinates of a point, with the fluid that it may name."""
+    fluid, colon, place = opening.rpartition(":")
     try:
-        return [float(number) for number in opening.split(",")]
+        point = [float(number) for number in place.split(",")]
     except ValueError:
         return opening
+    return (fluid, point) if colon else point

@@ -172,9 +172,9 @@ _INFILL_OPTIONS = (
         "--origin",
         nargs=3,
         type=float,
-        default=(0, 0, 0),
         metavar="X Y Z",
-        help="Where the lattice's own origin is placed, in mm; fields and maps go with it.",
+        help="Where the lattice's own origin is placed, in mm; fields and maps go with it. Left out it is 0 0 0, or "
+        "in a part a little beside where edges would be too short.",
     ),
     click.option(
         "--rotation",
@@ -263,7 +263,7 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     require_given(given, "cells")
     built = "trim" in given
     cut = {name: given[name] for name in _CUT_OPTIONS if built}
-    place = {name: given[name] for name in _PLACE_OPTIONS if built}
+    place = {name: given[name] for name in _PLACE_OPTIONS if built and given[name] is not None}
     if any(given[name] is not None for name in PAPER_OPTIONS):
         own_options = (*_OWN_OPTIONS, *cut)
         mixed = [name for name in own_options if given[name] not in (None, False)]

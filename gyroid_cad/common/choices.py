@@ -3,7 +3,7 @@
 Nothing else is loaded with them, so that ``--help`` and a shell's completion may ask too.
 
 >>> KINDS
-('sheet', 'network-a', 'network-b', 'channels', 'surface')
+('sheet', 'network-a', 'network-b', 'channels', 'bodies', 'surface')
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ __all__ = [
     "Trim",
 ]
 
-Kind = Literal["sheet", "network-a", "network-b", "channels", "surface"]
+Kind = Literal["sheet", "network-a", "network-b", "channels", "bodies", "surface"]
 SurfaceName = Literal["gyroid", "diamond", "primitive"]
 Trim = Literal["box"]
 # To a filled part: through exact solids, or through triangles alone.

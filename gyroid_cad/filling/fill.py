@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,19 +19,22 @@ from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
 from gyroid_cad.filling.forecast import require_cover
-from gyroid_cad.filling.infill import described_infill
-from gyroid_cad.filling.part import Filling, Outcome, bodies_of, part_of, without_specks
+from gyroid_cad.filling.infill import Foreseen, InfillIn, described_infill
+from gyroid_cad.filling.part import FilledBy, Filling, Outcome, bodies_of, part_of, without_specks
+from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, open_faces, require_of_bodies
 from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, checked_skin, grams_of
+from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part
-from gyroid_cad.kernel.skin import Hollow, hollow_round, opened_faces
+from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
+from gyroid_cad.kernel.solid import KernelFace
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.parameters import valid_tolerance
@@ -47,7 +50,7 @@ def fill(
     thickness: FieldLike | None = None,
     density: FieldLike | None = None,
     kind: Kind = SHEET,
-    origin: Point = (0.0, 0.0, 0.0),
+    origin: Point | None = None,
     rotation: Point = (0.0, 0.0, 0.0),
     fit: FitSettings | None = None,
     drop_islands: bool = False,
@@ -83,10 +86,13 @@ def fill(
         with x, y and z places in the part's space.
     density : number or field, optional
         Volume fraction instead: of the wall, or of the network, for which it is one number.
-    kind : {"sheet", "network-a", "network-b", "channels", "surface"}
-        The wall; one of the two networks it parts; both of them, the wall left out; or the mid-surface alone.
+    kind : {"sheet", "network-a", "network-b", "channels", "bodies", "surface"}
+        The wall; one of the two networks it parts; both of them, the wall left out; the wall, both fluids and the skin,
+        as bodies that share the faces between them; or the mid-surface alone.
     origin, rotation : tuple of float
         Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
+        Left out, and if no lattice is given, the origin is (0, 0, 0) or a few hundredths of a cell beside, where edges
+        would come out too short for who receives the solid: the report says so.
     fit : FitSettings, optional
     drop_islands : bool
         Drop every island: pieces not connected to the largest one. If not, small ones are dropped, which have less
@@ -100,7 +106,8 @@ def fill(
         Thickness in mm of a solid shell kept from the part and fused with the infill; channels end at it.
     openings : sequence
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
-        the faces furthest that way, or points (x, y, z), each for the face next to it.
+        the faces furthest that way, or points (x, y, z), each for the face next to it. Of bodies each may name the
+        fluid it is for, as in "a:>Z" or ("a", face): the channels of the other end at the skin there.
     core : shape, Workplane or path-like, optional
         Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
         core, open wherever the core comes to the part's boundary.
@@ -148,10 +155,11 @@ def fill(
     >>> abs(filled.report.density - 0.3) < 0.01
     True
     """
-    frame = frame_of(*placement(origin, rotation))
+    frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
-    rule = island_rule(keep_islands, drop_islands)
+    require_of_bodies(kind, openings, drop_islands, route)
+    rule = island_rule(keep_islands or kind == BODIES, drop_islands)
     closeness = None if tolerance is None else valid_tolerance(tolerance)
     chosen = surface_named(surface)
     require_route(route, deviation=deviation, repair=repair, fillet=fillet)
@@ -172,25 +180,63 @@ def fill(
         raise ParameterError("core", core, f"none of a part of {len(parts)} solids, unless solids chooses one")
     for remark in remarks:
         warn_caller(remark, PartWarning)
-    made, islands = [], Islands()
-    for (name, whole), faces in zip(parts, opened_faces(parts, openings), strict=True):
-        told = progress if len(parts) == 1 else named_progress(progress, name)
-        forecast = foreseen(whole)
-        report_progress(told, str(forecast), 0, round(forecast.seconds))
-        with naming_triangles(kind, name if len(parts) > 1 else ""):
-            hollow = _hollow(whole, shell, faces, core)
-            inner = whole if hollow is None else hollow.core
-            filling = Filling(whole, hollow, regions, functools.partial(infill_in, inner), size, told)
-            outcome = filling.run(frame)
+    naming = [functools.partial(naming_triangles, kind, name if len(parts) > 1 else "") for name, _ in parts]
+    wanted = _Wanted(kind, regions, size, shell, core, infill_in, foreseen)
+    fillings, made, islands = [], [], Islands()
+    for (name, whole), faces, named in zip(parts, open_faces(parts, openings), naming, strict=True):
+        with named():
+            fillings.append(
+                wanted.filling(whole, faces, progress if len(parts) == 1 else named_progress(progress, name))
+            )
+    clear = frame
+    if origin is None and lattice is None:
+        every = tuple(fillings)
+        clear = clear_frame(
+            lambda place, within: NearMisses.joined([one.near_misses(place, within) for one in every]), frame, size
+        )
+    for filling, named in zip(fillings, naming, strict=True):
+        with named():
+            outcome = filling.run(clear)
+        outcome = replace(outcome, shift=outcome.shift + clear.origin - frame.origin)
         domains, left = without_islands(outcome.domains, filling.cells, rule)
-        domains, voids = without_specks(domains, filling)
+        voids: tuple[SealedVoid, ...] = ()
+        if kind != BODIES:
+            domains, voids = without_specks(domains, filling)
         made.append(_reported(filling, replace(outcome, domains=domains), left, voids, kind, grams))
         islands += left
-    islands.warn("drop_islands drops")
+    islands.warn("" if kind == BODIES else "drop_islands drops")
     together = _together(made, remarks)
     warn_of_voids(together.report.voids)
     warn_of_uncovered(together.report.uncovered)
     return together
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wanted:
+    """Lattice, skin and core that every solid of a part is filled with."""
+
+    kind: Kind
+    regions: tuple[Region, ...]
+    cell_size: float
+    skin: float | None
+    core: Any
+    infill_in: InfillIn
+    foreseen: Foreseen
+
+    def filling(self, part: Part, opened: OpenFaces, progress: Progress | None) -> Filling | PortedFilling:
+        """The filling of a solid, once what it takes has been said."""
+        forecast = self.foreseen(part)
+        report_progress(progress, str(forecast), 0, round(forecast.seconds))
+        fillings = {fluid: self._one(part, fluid, faces, progress) for fluid, faces in opened.items()}
+        return fillings[ANY] if ANY in fillings else PortedFilling(fillings)
+
+    def _one(self, part: Part, fluid: str, opened: Sequence[KernelFace], progress: Progress | None) -> Filling:
+        hollow = _hollow(part, self.skin, opened, self.core)
+        inner = part if hollow is None else hollow.core
+        regions = self.regions if fluid == ANY else tuple(one for one in self.regions if one.name == fluid)
+        shared = self.kind == BODIES and fluid == ANY
+        infill = functools.partial(self.infill_in, inner)
+        return Filling(part, hollow, regions, infill, self.cell_size, progress, shared, tuple(opened))
 
 
 def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) -> Hollow | None:
@@ -208,17 +254,18 @@ def _together(filled: Sequence[Filled], remarks: Sequence[str]) -> Filled:
     """Bodies that were filled each by itself, as one."""
     report = joint_report([one.report for one in filled], remarks)
     if len(filled) == 1:
-        return Filled(filled[0].domains, report, filled[0].sizes)
+        return replace(filled[0], report=report)
     names = dict.fromkeys(name for one in filled for name in one.domains)
     return Filled(
         {name: compound_of(one.domains[name] for one in filled if name in one.domains) for name in names},
         report,
         {name: tuple(size for one in filled for size in one.sizes.get(name, ())) for name in names},
+        {name: tuple(called for one in filled for called in one.face_names.get(name, ())) for name in names},
     )
 
 
 def _reported(
-    filling: Filling,
+    filling: FilledBy,
     outcome: Outcome,
     islands: Islands,
     voids: tuple[SealedVoid, ...],
@@ -233,7 +280,10 @@ def _reported(
         for name, some in domains.items()
     }
     counted = topology(compound_of(shapes.values()))
-    volume = sum(made.volume for some in domains.values() for made in some)
+    # Beside a wall the fluids are no material.
+    fluids = {region.name for region in filling.regions if region.fluid} if kind == BODIES else set()
+    material = [made for name, some in domains.items() if name not in fluids for made in some]
+    volume = sum(made.volume for made in material)
     walls = [outcome.infill.min_thickness] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
     x, y, z = outcome.shift.tolist()
     report = FillReport(
@@ -249,7 +299,7 @@ def _reported(
         part_volume=filling.part.volume,
         volume=volume,
         density=volume / filling.part.volume,
-        area=sum(made.area for some in domains.values() for made in some),
+        area=sum(made.area for made in material),
         mass=None if grams is None else grams * volume,
         part_mass=None if grams is None else grams * filling.part.volume,
         islands=islands.kept,
@@ -264,5 +314,8 @@ def _reported(
         seconds=dict(filling.seconds),
         cells_alike=outcome.infill.grading.cells_alike,
         uncovered=outcome.infill.uncovered,
+        volumes={name: sum(made.volume for made in some) for name, some in domains.items()},
     )
-    return Filled(shapes, report, {name: tuple(made.size for made in some) for name, some in domains.items()})
+    sizes = {name: tuple(made.size for made in some) for name, some in domains.items()}
+    face_names = {name: tuple(called for made in some for called in made.face_names) for name, some in domains.items()}
+    return Filled(shapes, report, sizes, face_names)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
@@ -13,6 +13,7 @@ from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_forma
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.report import FillReport
+from gyroid_cad.filling.wanted import BODIES, FLUID_A, FLUID_B, SKIN, WALL
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
@@ -21,9 +22,13 @@ from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.step.header import StepHeader
+from gyroid_cad.step.products import BodyLabels
 from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["Filled"]
+
+# By which STEP knows them, so that no reader rounds them.
+_COLOURS = {WALL: "yellow", FLUID_A: "red", FLUID_B: "blue", SKIN: "white"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,10 +38,13 @@ class Filled(HostShapes):
     Attributes
     ----------
     domains : dict
-        Shape by name: "sheet", "network-a", "network-b", "surface", or "channel-a" and "channel-b".
+        Shape by name: "sheet", "network-a", "network-b", "surface"; "channel-a" and "channel-b"; or of bodies "wall",
+        "fluid-a", "fluid-b" and, if there is one, "skin".
     report : FillReport
     sizes : dict
         Volume, area and, where it is known as exactly, centroid of each solid, by the name of its domain.
+    face_names : dict
+        Of bodies, names of all faces in the order in which the kernel counts them, likewise.
 
     Examples
     --------
@@ -51,6 +59,7 @@ class Filled(HostShapes):
     domains: dict[str, KernelShape]
     report: FillReport
     sizes: dict[str, tuple[ShapeSize, ...]]
+    face_names: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def solid(self) -> KernelShape:
         """One TopoDS_Solid, or a TopoDS_Compound of all of them, under a handle of the caller's own.
@@ -152,9 +161,19 @@ class Filled(HostShapes):
         for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
             if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
+            if self.report.kind == BODIES:
+                raise ParameterError("output", str(path), "STEP or BREP, which tell bodies that share faces apart")
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
         sizes = [size for name in self.domains for size in self.sizes[name]]
-        names = [name for name, shape in self.domains.items() for _ in range(topology(shape).solids)]
+        labels = self._labels()
         for path in targets:
             with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), sizes, path, header, limit, angle, names)
+                write_shape(self.solid(), sizes, path, header, limit, angle, labels)
+
+    def _labels(self) -> BodyLabels:
+        """Names of all solids; of bodies that share their faces colours and the names of those too."""
+        names = [name for name, shape in self.domains.items() for _ in range(topology(shape).solids)]
+        if self.report.kind != BODIES:
+            return BodyLabels(names)
+        called = [name for domain in self.domains for name in self.face_names[domain]]
+        return BodyLabels(names, [_COLOURS[name] for name in names], called)

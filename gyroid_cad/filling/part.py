@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +16,25 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.roads import Made, Road, taken
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
+from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
 from gyroid_cad.kernel.check import compound_of, is_valid, measure, sealed_shells, topology, without_shells
 from gyroid_cad.kernel.part import Part, require_part, sound_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
-from gyroid_cad.kernel.solid import KernelShape
+from gyroid_cad.kernel.solid import KernelFace, KernelShape
+from gyroid_cad.trim.clearance import NearMisses, near_misses
 from gyroid_cad.trim.islands import SealedVoid, piece_size, speck_below
-from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
+from gyroid_cad.trim.lattice_faces import LatticeFaces
+from gyroid_cad.wall.covering import CROSSING, PERTURBATIONS, Frame, first_success
 
 __all__ = [
+    "FilledBy",
     "Filling",
     "Made",
     "Outcome",
@@ -41,6 +46,7 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # Share of all volume that a piece may be below zero by: rounding.
 _INSIDE_OUT = 1e-9
@@ -77,7 +83,23 @@ class Outcome:
     by_sections: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+class FilledBy(Protocol):
+    """Part that was filled, with what, and how long it took."""
+
+    @property
+    def part(self) -> Part: ...
+    @property
+    def hollow(self) -> Hollow | None: ...
+    @property
+    def regions(self) -> tuple[Region, ...]: ...
+    @property
+    def cell_size(self) -> float: ...
+    @property
+    def seconds(self) -> dict[str, float]: ...
+    def near_misses(self, frame: Frame, within: float) -> NearMisses: ...
+
+
+@dataclass(frozen=True, eq=False)
 class Filling:
     """A part to be filled: all that stays the same however the lattice is shifted.
 
@@ -92,6 +114,10 @@ class Filling:
     cell_size : float
         In mm.
     progress : callable, optional
+    shared : bool
+        Whether the regions are wanted as bodies that share their faces, the skin too.
+    opened : tuple of KernelFace
+        The part's faces where its skin is open.
     seconds : dict
         By stage.
     """
@@ -102,7 +128,36 @@ class Filling:
     infill_in: Callable[[Frame, Callable[[str], AbstractContextManager[None]]], Infill]
     cell_size: float
     progress: Progress | None
+    shared: bool = False
+    opened: tuple[KernelFace, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def infill_at(self) -> Callable[[Frame], Infill]:
+        """The lattice in a frame, made once for each."""
+        made: dict[tuple[float, ...], Infill] = {}
+
+        def infill(frame: Frame) -> Infill:
+            key = tuple(frame.origin.tolist())
+            if key not in made:
+                made[key] = self.infill_in(frame, self.timed)
+            return made[key]
+
+        return infill
+
+    @cached_property
+    def boundary(self) -> ReadBoundary:
+        """Boundary of what is filled, as numbers.
+
+        Raises
+        ------
+        KernelError
+        """
+        return read_boundary(self.core.shape)
+
+    @cached_property
+    def _extent(self) -> PartExtent:
+        return PartExtent(self.core, self.cell_size)
 
     @property
     def core(self) -> Part:
@@ -124,25 +179,50 @@ class Filling:
         points = np.random.default_rng(0).uniform(self.core.low, self.core.high, (_ESTIMATE_POINTS, 3))
         with self.timed("cover"):
             points = points[self.core.contains(points)]
-        infill_at = cache(lambda phase: self._shifted(frame, phase))
+
+        def infill_at(phase: Point) -> Infill:
+            return self.infill_at(replace(frame, origin=frame.origin + np.array(phase) * self.cell_size))
+
         # Faces that touch the part are in doubt there: first shift, and only then ask the kernel; the last time in one
         # process, should it be the joining of regions that fails.
         attempts: list[tuple[Road, Point, int | None]] = [
             ("booleans", phase, processes) for phase, processes in zip(PERTURBATIONS, (None, None, 1), strict=True)
         ]
         attempts = [("crossings", phase, None) for phase in PERTURBATIONS] + attempts
+        if self.shared:
+            attempts = [("bodies", phase, None) for phase in PERTURBATIONS]
         # A box's sections know nothing of walls where a lattice ends.
         single = self.hollow is None or len(self.part.solids) == 1
-        if self.core.box is not None and single and infill_at(PERTURBATIONS[0]).endless:
+        if self.core.box is not None and single and not self.shared and infill_at(PERTURBATIONS[0]).endless:
             attempts = [("sections", phase, None) for phase in PERTURBATIONS] + attempts
         return first_success(
             partial(self._attempt, number, infill_at, phase, points, road, processes)
             for number, (road, phase, processes) in enumerate(attempts, 1)
         )
 
-    def _shifted(self, frame: Frame, phase: Point) -> Infill:
-        """The lattice, shifted by so many cells."""
-        return self.infill_in(replace(frame, origin=frame.origin + np.array(phase) * self.cell_size), self.timed)
+    def near_misses(self, frame: Frame, within: float) -> NearMisses:
+        """Places where the lattice in a frame is so near to the part's edges and faces, in mm; none if it ends.
+
+        Raises
+        ------
+        ParameterError, SelfIntersectionError, FitError
+        """
+        infill = self.infill_at(frame)
+        if not infill.endless:
+            return NearMisses.joined([])
+        with self.timed("cover"):
+            crossing = np.flatnonzero(self.sides(infill) == CROSSING)
+            sides = sorted({side for region in self.regions for side, _ in region.sides})
+            faces = LatticeFaces(infill.wall, np.tile(crossing, len(sides)), np.repeat(sides, len(crossing)))
+            try:
+                return near_misses(faces, self.boundary.boundary, within)
+            except KernelError:
+                # What ails the part is found again, and said, where it is cut.
+                return NearMisses.joined([])
+
+    def sides(self, infill: Infill) -> Integers:
+        """Side of the part on which each patch lies, or that it may be crossed."""
+        return infill.sides(self._extent.clearance, self.core.contains)
 
     def _attempt(self, number: int, *given: Any) -> Outcome:
         """Fill, and announce it where it fails: another attempt takes as long again."""
@@ -184,7 +264,8 @@ class Filling:
         else:
             hits = int(np.sum(infill.contains(region, points)))
         box = float(np.prod(self.core.high - self.core.low)) / _ESTIMATE_POINTS / layer
-        skin = 0.0 if self.hollow is None or region.fluid else self.part.volume - self.core.volume
+        apart = self.hollow is None or region.fluid or self.shared
+        skin = 0.0 if apart else self.part.volume - self.core.volume
         sizes = [piece_size(piece) for piece in made]
         if min(sizes, default=0.0) < -_INSIDE_OUT * sum(map(abs, sizes)):
             # Beside another that is too large it would not be seen in their sum.
@@ -199,6 +280,7 @@ class Filling:
 
     def _require_simple(self, shapes: Iterable[KernelShape]) -> None:
 
+        # One by one: bodies that share a face have its edges four times.
         everything = compound_of(shapes)
         counted, valid = topology(everything), is_valid(everything)
         closed = counted.closed or all(region.surface for region in self.regions)
@@ -208,7 +290,7 @@ class Filling:
 
 
 def without_specks(
-    domains: dict[str, list[Made]], filling: Filling
+    domains: dict[str, list[Made]], filling: FilledBy
 ) -> tuple[dict[str, list[Made]], tuple[SealedVoid, ...]]:
     """Return the solids of every domain without specks of void, and the voids that they enclose, the largest first.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from gyroid_cad.common.arrays import Point
@@ -132,6 +132,7 @@ class FillReport:
     remarks: tuple[str, ...] = ()
     route: Route = "brep"
     deviation: float | None = None
+    volumes: dict[str, float] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -149,11 +150,16 @@ class FillReport:
             *(("part", remark) for remark in self.remarks),
             self._counted(),
             ("volume", f"{self.volume:.8g} mm3 of {of_part}"),
+            *self._volumes_shown(),
             ("area", f"{self.area:.6g} mm2"),
             *([] if self.mass is None else [("mass", f"{self.mass:.4g} g of {self.part_mass:.4g} g")]),
             ("islands", islands_shown(self.islands, self.islands_volume, self.dropped, self.dropped_volume)),
             *([("sealed voids", self._voids_shown())] if self.voids else []),
-            *([("shifted by", f"{self.shift} mm: the kernel failed without")] if any(self.shift) else []),
+            *(
+                [("shifted by", f"{self._shift_shown()} mm: where it stood, cuts failed or left edges too short")]
+                if any(self.shift)
+                else []
+            ),
         ]
 
     def _counted(self) -> tuple[str, str]:
@@ -162,6 +168,14 @@ class FillReport:
             return "solids, triangles", f"{self.solids}, {self.faces:,} ({within})"
         state = f"{'valid' if self.valid else 'invalid'}{' and closed' if self.closed else ''}"
         return "solids, faces", f"{self.solids}, {self.faces} ({state})"
+
+    def _shift_shown(self) -> str:
+        return f"({', '.join(f'{along:.4g}' for along in self.shift)})"
+
+    def _volumes_shown(self) -> Rows:
+        """Volumes of what there is more than one of."""
+        several = self.volumes if len(self.volumes) > 1 else {}
+        return [(name, f"{volume:.8g} mm3") for name, volume in several.items()]
 
     def _voids_shown(self) -> str:
         shown = "; ".join(map(str, self.voids[:_VOIDS_SHOWN]))
@@ -205,6 +219,10 @@ def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> 
         shift=next((report.shift for report in reports if any(report.shift)), first.shift),
         seconds={stage: sum(report.seconds.get(stage, 0.0) for report in reports) for stage in stages},
         voids=tuple(sorted((void for report in reports for void in report.voids), key=lambda void: -void.volume)),
+        volumes={
+            name: sum(report.volumes.get(name, 0.0) for report in reports)
+            for name in dict.fromkeys(name for report in reports for name in report.volumes)
+        },
         bodies=len(reports),
         remarks=remarks,
     )

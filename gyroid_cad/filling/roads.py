@@ -16,18 +16,18 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
-from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
-from gyroid_cad.filling.wanted import Region
-from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
-from gyroid_cad.kernel.check import measure
+from gyroid_cad.filling.wanted import SKIN, WALL, Region
+from gyroid_cad.kernel.boundary import ReadBoundary
+from gyroid_cad.kernel.check import faces_of, measure
+from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.crossed import FaceSizes, crossed_pieces
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.shells import VolumeOf, connected_shells
 from gyroid_cad.kernel.skin import Hollow
-from gyroid_cad.kernel.solid import KernelShape
-from gyroid_cad.kernel.split import Pieces, bounded_solids
+from gyroid_cad.kernel.solid import KernelFace, KernelShape
+from gyroid_cad.kernel.split import Pieces, bounded_solids, parted_solids
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.crossing import cross_part
@@ -35,11 +35,12 @@ from gyroid_cad.trim.measures import PieceMeasures, boundary_measures, joined, l
 from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
-__all__ = ["Job", "Made", "Road", "taken"]
+__all__ = ["Crossed", "Job", "Made", "Road", "crossed_by", "patches_of", "taken"]
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
-Road = Literal["sections", "crossings", "booleans"]
+Road = Literal["sections", "crossings", "booleans", "bodies"]
 # Solids by the name of their region; patches that the part's boundary may cross; and those that lie wholly inside.
 Found = tuple[dict[str, list["Made"]], int, int]
 
@@ -48,13 +49,15 @@ Found = tuple[dict[str, list["Made"]], int, int]
 class Made:
     """A solid, or a shell of the bare surface, with its volume in mm3, its area in mm2, and its centroid in mm.
 
-    There is no centroid where the kernel measured some of it, which is not as exact.
+    There is no centroid where the kernel measured some of it, which is not as exact. Names of its faces, if it has any,
+    are in the order in which the kernel counts them.
     """
 
     shape: KernelShape
     volume: float
     area: float
     centroid: Point | None = None
+    face_names: tuple[str, ...] = ()
 
     @property
     def size(self) -> ShapeSize:
@@ -76,6 +79,9 @@ class Job(Protocol):
     def cell_size(self) -> float: ...
     @property
     def progress(self) -> Progress | None: ...
+    @property
+    def boundary(self) -> ReadBoundary: ...
+    def sides(self, infill: Infill) -> NDArray[np.int64]: ...
     def timed(self, stage: str) -> AbstractContextManager[None]: ...
 
 
@@ -84,8 +90,9 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
 
     Parameters
     ----------
-    road : {"sections", "crossings", "booleans"}
-        Sections are of a box alone, and of endless lattices, for they cut no side walls.
+    road : {"sections", "crossings", "booleans", "bodies"}
+        Sections are of a box alone, and of endless lattices, for they cut no side walls. Bodies are those of crossings
+        with the first region, and what it leaves.
     job : Job
     infill : Infill
     processes : int, optional
@@ -97,9 +104,9 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
     """
     if road == "sections":
         return _by_sections(job, infill)
-    if road == "crossings":
+    if road in ("crossings", "bodies"):
         try:
-            return _by_crossings(job, infill)
+            return _by_crossings(job, infill, road == "bodies")
         except np.linalg.LinAlgError as singular:
             raise KernelError("an edge of the part lies along the lattice") from singular
     return _by_booleans(job, infill, processes)
@@ -149,31 +156,168 @@ def _patches_of(left: TrimmedWall) -> tuple[int, int]:
     return len(cut), len({face.patch for face in left.faces} - cut)
 
 
-def _by_crossings(job: Job, infill: Infill) -> Found:
+def _by_crossings(job: Job, infill: Infill, bodies: bool) -> Found:
     """Fill any part: the curves in which the lattice crosses its boundary are found by number."""
-    with job.timed("cover"):
-        extent = PartExtent(job.core, job.cell_size)
-        sides = infill.sides(extent.clearance, job.core.contains)
-        read = read_boundary(job.core.shape)
-    crossing, inside = (np.flatnonzero(sides == side) for side in (CROSSING, INSIDE))
-    made = {region.name: _crossed(job, infill, region, read, crossing, inside) for region in job.regions}
+    crossing, inside = patches_of(job, infill)
+    if bodies:
+        made = _bodies(job, infill, crossed_by(job, infill, job.regions[0], crossing, inside, outer=True))
+    else:
+        made = {
+            region.name: _joined_crossed(
+                job, infill, region, crossed_by(job, infill, region, crossing, inside, job.hollow is not None)
+            )
+            for region in job.regions
+        }
     return made, len(crossing), len(inside)
 
 
-def _crossed(
-    job: Job, infill: Infill, region: Region, read: ReadBoundary, crossing: NDArray[np.int64], inside: NDArray[np.int64]
-) -> list[Made]:
+def patches_of(job: Job, infill: Infill) -> tuple[Integers, Integers]:
+    """Patches that the boundary of what is filled may cross, and those that lie wholly inside."""
+    with job.timed("cover"):
+        sides = job.sides(infill)
+    return np.flatnonzero(sides == CROSSING), np.flatnonzero(sides == INSIDE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crossed:
+    """Pieces of the core's boundary and of the lattice's faces, faces that nothing cut, and how large they are.
+
+    Attributes
+    ----------
+    pieces : Pieces
+    faces : list of KernelFace
+        Uncut.
+    measures : PieceMeasures
+        Of the pieces of the lattice's faces, of those of the boundary, and of the uncut faces.
+    middle : ndarray, shape (3,)
+        That they are taken about.
+    sides : list of int
+        Of the wall, 0 or 1: on which the pieces of the lattice's faces are, and then the uncut faces.
+    """
+
+    pieces: Pieces
+    faces: list[KernelFace]
+    measures: PieceMeasures
+    middle: Floats
+    sides: list[int]
+
+    @property
+    def measured(self) -> list[KernelFace]:
+        """Faces in the order of their measures."""
+        return [*self.pieces.inside, *self.pieces.boundary, *self.faces]
+
+
+def _bodies(job: Job, infill: Infill, crossed: Crossed) -> dict[str, list[Made]]:
+    """The first region, what it leaves on either side of it, and the skin, as bodies that share their faces."""
+    wall, *fluids = job.regions
+    pieces, faces = crossed.pieces, crossed.faces
+    sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
+
+    def volume_of(shell: KernelShape) -> float:
+        return sizes.of(shell).volume
+
+    with job.timed("join"):
+        within, beside = parted_solids(
+            pieces, faces, lambda point: bool(infill.contains(wall, point[np.newaxis])[0]), volume_of
+        )
+        found: dict[str, list[KernelShape]] = {wall.name: list(within), **{fluid.name: [] for fluid in fluids}}
+        named = _FaceNames(crossed, job.hollow, {side: fluid.name for fluid in fluids for side, _ in fluid.sides})
+        for solid in beside:
+            found[named.fluid_of(solid)].append(solid)
+        if job.hollow is not None:
+            found[SKIN] = list(job.hollow.skin_solids(pieces, volume_of))
+    return {
+        name: [_made(shape, sizes.of(shape), named.of(shape, name)) for shape in some] for name, some in found.items()
+    }
+
+
+def _made(shape: KernelShape, size: ShapeSize, names: tuple[str, ...]) -> Made:
+    return Made(shape, size.volume, size.area, size.centroid, names)
+
+
+class _FaceNames:
+    """Names of the faces of bodies, by what is on their other side: a face that two of them share has one."""
+
+    def __init__(self, crossed: Crossed, hollow: Hollow | None, fluids: dict[int, str]) -> None:
+        self._numbers, self._hollow, self._fluids = NumberedShapes(), hollow, fluids
+        self._sides, self._origins = crossed.sides, crossed.pieces.origins
+        for face in [*crossed.pieces.inside, *crossed.faces, *crossed.pieces.boundary]:
+            self._numbers.Add(face)
+
+    def fluid_of(self, solid: KernelShape) -> str:
+        """Name of the fluid that a solid beside the wall is."""
+        numbers = (self._numbers.FindIndex(face) for face in faces_of(solid))
+        side = next((self._sides[number - 1] for number in numbers if 0 < number <= len(self._sides)), None)
+        if side is None:
+            raise KernelError("a piece of the part meets no wall, so that it belongs to neither fluid")
+        return self._fluids[side]
+
+    def of(self, solid: KernelShape, body: str) -> tuple[str, ...]:
+        """Names of the faces of a body, in the order in which the kernel counts them."""
+        return tuple(self._name(int(self._numbers.FindIndex(face)) - 1, body) for face in faces_of(solid))
+
+    def _name(self, number: int, body: str) -> str:
+        if number < 0:
+            return f"{SKIN}/outside"
+        if number < len(self._sides):
+            return f"{WALL}/{self._fluids[self._sides[number]][-1]}"
+        origin = self._origins[number - len(self._sides)]
+        if self._hollow is None:
+            return f"{body}/face {origin + 1}"
+        return (
+            f"{body}/opening {sum(self._hollow.opened[: origin + 1])}"
+            if self._hollow.opened[origin]
+            else f"{SKIN}/inside"
+        )
+
+
+def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: Crossed) -> list[Made]:
+    sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
+    with job.timed("join"):
+        shapes = _joined(job, infill, region, crossed.pieces, crossed.faces, lambda shell: sizes.of(shell).volume)
+        made = [(shape, sizes.of(shape)) for shape in shapes]
+    return [
+        Made(shape, 0.0, size.area) if region.surface else Made(shape, size.volume, size.area, size.centroid)
+        for shape, size in made
+    ]
+
+
+def crossed_by(
+    job: Job,
+    infill: Infill,
+    region: Region,
+    crossing: Integers,
+    inside: Integers,
+    outer: bool,
+) -> Crossed:
+    """Cross what bounds a region with the boundary of what is filled.
+
+    Parameters
+    ----------
+    job : Job
+    infill : Infill
+    region : Region
+    crossing, inside : ndarray of int
+        As of :func:`patches_of`.
+    outer : bool
+        Whether pieces of the boundary beside the region are wanted too.
+
+    Raises
+    ------
+    KernelError
+    """
+
     def in_region(points: Floats) -> Booleans:
         return infill.contains(region, points)
 
     with job.timed("cut"):
         cut = cross_part(
             *infill.bounding(region, crossing),
-            read.boundary,
+            job.boundary.boundary,
             job.cell_size,
             job.core.contains,
             None if region.surface else in_region,
-            outer=job.hollow is not None,
+            outer=outer,
             progress=lambda done, count: report_progress(job.progress, "cut", done, count),
         )
     whole = infill.bounding(region, inside)
@@ -188,22 +332,17 @@ def _crossed(
 
     with beside(measured, "measures the faces") as measures:
         with job.timed("solid"):
-            pieces, faces = crossed_pieces(cut, read, *whole)
+            pieces, faces = crossed_pieces(cut, job.boundary, *whole)
         with job.timed("measure"):
-            sizes = FaceSizes([*pieces.inside, *pieces.boundary, *faces], measures(), middle)
-    with job.timed("join"):
-        shapes = _joined(job, infill, region, pieces, faces, lambda shell: sizes.of(shell).volume)
-        made = [(shape, sizes.of(shape)) for shape in shapes]
-    return [
-        Made(shape, 0.0, size.area) if region.surface else Made(shape, size.volume, size.area, size.centroid)
-        for shape, size in made
-    ]
+            found = measures()
+    sides = [*cut.faces.side[[piece.face for piece in cut.lattice]].tolist(), *whole[0].side.tolist()]
+    return Crossed(pieces, faces, found, middle, sides)
 
 
 def _by_booleans(job: Job, infill: Infill, processes: int | None = None) -> Found:
     """Fill any part by the kernel's general fuse."""
     with job.timed("cover"):
-        sides = infill.sides(PartExtent(job.core, job.cell_size).clearance, job.core.contains)
+        sides = job.sides(infill)
     made = {}
     for region in job.regions:
         with job.timed("faces"):

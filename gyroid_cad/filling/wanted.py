@@ -18,11 +18,16 @@ from gyroid_cad.wall.grading import THINNEST_WALL
 from gyroid_cad.wall.parameters import percent_hint, require_density, require_one, require_thickness
 
 __all__ = [
+    "BODIES",
     "CHANNELS",
+    "FLUID_A",
+    "FLUID_B",
     "NETWORK_A",
     "NETWORK_B",
     "SHEET",
+    "SKIN",
     "SURFACE",
+    "WALL",
     "Region",
     "Regions",
     "checked_skin",
@@ -36,7 +41,9 @@ Booleans = NDArray[np.bool_]
 # Of materials, in g/cm3: osmium has 22.6, and steel in kg/m3 7850.
 _DENSEST = 100.0
 
-SHEET, NETWORK_A, NETWORK_B, CHANNELS, SURFACE = KINDS
+SHEET, NETWORK_A, NETWORK_B, CHANNELS, BODIES, SURFACE = KINDS
+# Of bodies that share their faces.
+WALL, FLUID_A, FLUID_B, SKIN = "wall", "fluid-a", "fluid-b", "skin"
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +120,7 @@ def regions_of(
 
     Parameters
     ----------
-    kind : {"sheet", "network-a", "network-b", "channels", "surface"}
+    kind : {"sheet", "network-a", "network-b", "channels", "bodies", "surface"}
     cell_size : float
         In mm.
     thickness, density : number or field, optional
@@ -137,11 +144,10 @@ def regions_of(
         if thickness is not None:
             raise ParameterError("thickness", thickness, "none of a network, which is told by its density")
         return _network(kind, cell_size, density, tube)
-    regions = (
-        (Region("channel-a", 1.0, None, fluid=True), Region("channel-b", None, -1.0, fluid=True))
-        if kind == CHANNELS
-        else (Region(SHEET, -1.0, 1.0),)
-    )
+    names = ("channel-a", "channel-b") if kind == CHANNELS else (FLUID_A, FLUID_B)
+    fluids = Region(names[0], 1.0, None, fluid=True), Region(names[1], None, -1.0, fluid=True)
+    wall = Region(WALL if kind == BODIES else SHEET, -1.0, 1.0)
+    regions = fluids if kind == CHANNELS else (wall, *fluids) if kind == BODIES else (wall,)
     return _wall(regions, cell_size, thickness, density, tube)
 
 

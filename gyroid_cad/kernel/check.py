@@ -57,6 +57,11 @@ _MEASURE = 1e-4
 
 def topology(shape: TopoDS_Shape) -> Topology:
     """Count solids, faces and edges that are not shared by exactly two faces."""
+    solids = list(parts_of(shape, TopAbs_SOLID))
+    if len(solids) > 1:
+        # Solids may share faces, so that an edge bounds two of each.
+        counts = [topology(solid) for solid in solids]
+        return Topology(len(solids), *(sum(getattr(one, name) for one in counts) for name in ("faces", "open_edges")))
     edges = NumberedShapes()
     uses: dict[tuple[int, TopAbs_Orientation], int] = {}
     # The explorer visits an edge once for each face it bounds, oriented as that face uses it.
@@ -68,7 +73,7 @@ def topology(shape: TopoDS_Shape) -> Topology:
         uses[use] = uses.get(use, 0) + 1
     both = ((uses.get((i, TopAbs_FORWARD)), uses.get((i, TopAbs_REVERSED))) for i in range(1, edges.Extent() + 1))
     return Topology(
-        solids=sum(1 for _ in parts_of(shape, TopAbs_SOLID)),
+        solids=len(solids),
         faces=sum(1 for _ in parts_of(shape, TopAbs_FACE)),
         open_edges=sum(pair != (1, 1) for pair in both),
     )
@@ -217,6 +222,11 @@ def parts_of(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Iterator[TopoDS_Sha
     while explorer.More():
         yield explorer.Current()
         explorer.Next()
+
+
+def faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
+    """The faces of a shape, in the order in which the kernel counts them."""
+    return [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
 
 
 def compound_of(shapes: Iterable[TopoDS_Shape]) -> TopoDS_Compound:

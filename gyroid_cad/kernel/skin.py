@@ -98,8 +98,33 @@ class Hollow:
             for piece, origin, inner in boundary
             if inner == self.opened[origin]
         ]
-        skin = with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
-        return solids_of([*skin, *pieces.inside, *map(as_face, whole), *ends], volume_of)
+        return solids_of([*self.skin_faces(pieces), *pieces.inside, *map(as_face, whole), *ends], volume_of)
+
+    def skin_solids(self, pieces: Pieces, volume_of: VolumeOf | None = None) -> list[TopoDS_Solid]:
+        """The skin alone, which shares pieces of the core's boundary with what is in the core.
+
+        Parameters
+        ----------
+        pieces : Pieces
+            Of the core, as split against a lattice.
+        volume_of : callable, optional
+            As of :func:`~gyroid_cad.kernel.shells.solids_of`.
+
+        Raises
+        ------
+        KernelError
+            If the faces do not close.
+        """
+        inner = [
+            as_face(piece.Reversed())
+            for piece, origin in zip(pieces.boundary, pieces.origins, strict=True)
+            if not self.opened[origin]
+        ]
+        return solids_of([*self.skin_faces(pieces), *inner], volume_of)
+
+    def skin_faces(self, pieces: Pieces) -> Sequence[TopoDS_Face]:
+        """Faces of the skin that it does not share with the core, with their edges as the core's have been split."""
+        return with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
 
 
 def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Hollow:

@@ -33,6 +33,7 @@ from gyroid_cad.wall.offset import SIDES, Wall, side_along
 
 __all__ = [
     "TOLERANCE",
+    "KernelFace",
     "KernelShape",
     "another_handle",
     "build_faces",
@@ -42,6 +43,7 @@ __all__ = [
 ]
 
 KernelShape: TypeAlias = TopoDS_Shape
+KernelFace: TypeAlias = TopoDS_Face
 
 # Where the patch's corners are in its control net.
 _CORNER_INDEX = ((0, 0), (-1, 0), (-1, -1), (0, -1))

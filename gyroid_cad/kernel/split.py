@@ -38,6 +38,7 @@ __all__ = [
     "general_fuse",
     "inner_sides",
     "modified",
+    "parted_solids",
     "running_like",
     "split",
 ]
@@ -136,6 +137,31 @@ def bounded_solids(
     boundary = zip(pieces.boundary, inner_sides(pieces, wanted_at), strict=True)
     inner = (piece for piece, inner in boundary if inner)
     return solids_of([*pieces.inside, *map(as_face, whole), *inner], volume_of)
+
+
+def parted_solids(
+    pieces: Pieces,
+    whole: Sequence[TopoDS_Shape],
+    wanted_at: Callable[[Floats], bool],
+    volume_of: VolumeOf | None = None,
+) -> tuple[list[TopoDS_Solid], list[TopoDS_Solid]]:
+    """The solids on either side of the faces of the lattice in the part, which share those faces.
+
+    Arguments and errors are those of :func:`bounded_solids`.
+
+    Returns
+    -------
+    within, beside : list of TopoDS_Solid
+        That the faces are oriented out of, and the rest of the part.
+    """
+    faces = [*pieces.inside, *map(as_face, whole)]
+    sides = inner_sides(pieces, wanted_at)
+    within, beside = (
+        [piece for piece, inner in zip(pieces.boundary, sides, strict=True) if inner == wanted]
+        for wanted in (True, False)
+    )
+    turned = [as_face(face.Reversed()) for face in faces]
+    return solids_of([*faces, *within], volume_of), solids_of([*turned, *beside], volume_of)
 
 
 def inner_sides(pieces: Pieces, wanted_at: Callable[[Floats], bool]) -> list[bool]:

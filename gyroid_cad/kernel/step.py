@@ -30,7 +30,7 @@ from gyroid_cad.kernel.step_geometry import UnknownGeometryError
 from gyroid_cad.kernel.step_solids import products_of
 from gyroid_cad.step.counts import Topology, require_counts
 from gyroid_cad.step.header import DESCRIPTION, PROGRAM, StepHeader, product_name, time_stamp
-from gyroid_cad.step.products import Occurrence, StepPart, write_products
+from gyroid_cad.step.products import UNLABELLED, BodyLabels, Occurrence, StepPart, write_products
 from gyroid_cad.step.text import escaped
 from gyroid_cad.wall.areas import ShapeSize, joint_size
 
@@ -68,7 +68,7 @@ def write_step(
     header: StepHeader = _PLAIN,
     name: str | None = None,
     sizes: Sequence[ShapeSize] = (),
-    body_names: Sequence[str] = (),
+    labels: BodyLabels = UNLABELLED,
 ) -> None:
     """Write a shape in millimetres.
 
@@ -88,7 +88,7 @@ def write_step(
     sizes : sequence of ShapeSize
         For receivers to compare what they find with, one a body as the kernel counts them, or none; where the kernel's
         writer is asked, they are left out.
-    body_names : sequence of str
+    labels : BodyLabels
         Likewise.
 
     Raises
@@ -97,7 +97,7 @@ def write_step(
     """
     product = product_name(path, name)
     try:
-        parts, places = products_of(shape, product, body_names, sizes)
+        parts, places = products_of(shape, product, labels, sizes)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, header, escaped(product))
     else:

@@ -29,7 +29,7 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid, as_wire
 from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement
 from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
-from gyroid_cad.step.products import Occurrence, StepPart
+from gyroid_cad.step.products import UNLABELLED, BodyLabels, Occurrence, StepPart
 from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["products_of", "read_step_bodies", "require_bodies"]
@@ -50,7 +50,7 @@ def read_step_bodies(shape: TopoDS_Shape) -> list[StepBody]:
 
 
 def products_of(
-    shape: TopoDS_Shape, name: str, body_names: Sequence[str] = (), sizes: Sequence[ShapeSize] = ()
+    shape: TopoDS_Shape, name: str, labels: BodyLabels = UNLABELLED, sizes: Sequence[ShapeSize] = ()
 ) -> tuple[list[StepPart], list[Occurrence]]:
     """Return the parts that a shape is written as, and their places if it has a solid in several.
 
@@ -59,10 +59,10 @@ def products_of(
     shape : TopoDS_Shape
     name : str
         Of the product.
-    body_names : sequence of str
-        One a body, as the kernel counts them, or none.
+    labels : BodyLabels
+        Of the bodies as the kernel counts them; of those in several places they are left out.
     sizes : sequence of ShapeSize
-        Likewise; of bodies in several places, or of others than there are, they are left out.
+        One a body, or none; of bodies in several places, or of others than there are, they are left out.
 
     Raises
     ------
@@ -72,7 +72,15 @@ def products_of(
     which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
     if len(bodies) == kinds.Extent():
         own = sizes if len(sizes) == len(bodies) else ()
-        return [StepPart(name, read_step_bodies(shape), body_names=body_names, body_sizes=own)], []
+        part = StepPart(
+            name,
+            read_step_bodies(shape),
+            body_names=labels.names,
+            body_colours=labels.colours,
+            face_names=labels.face_names,
+            body_sizes=own,
+        )
+        return [part], []
     parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
     places = [axis_placement(body.Location()) for body in bodies]
     return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]

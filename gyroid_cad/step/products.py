@@ -14,7 +14,7 @@ from gyroid_cad.step.header import StepHeader, header_section
 from gyroid_cad.step.text import StepText, quoted, real, refs
 from gyroid_cad.wall.areas import ShapeSize
 
-__all__ = ["Occurrence", "StepPart", "write_products"]
+__all__ = ["UNLABELLED", "BodyLabels", "Occurrence", "StepPart", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -55,6 +55,8 @@ class StepPart:
         One a body, or none.
     body_sizes : sequence of ShapeSize
         One a body, or none; of a single body that of the product is enough.
+    body_colours : sequence of str
+        Likewise, instead of the part's.
     face_names, face_colours : sequence of str
         One a face, as the kernel counts them, or none.
     size : ShapeSize, optional
@@ -65,9 +67,30 @@ class StepPart:
     colour: str = ""
     body_names: Sequence[str] = ()
     body_sizes: Sequence[ShapeSize] = ()
+    body_colours: Sequence[str] = ()
     face_names: Sequence[str] = ()
     face_colours: Sequence[str] = ()
     size: ShapeSize | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BodyLabels:
+    """Names and colours that bodies have in a file; each may be left out.
+
+    Attributes
+    ----------
+    names, colours : sequence of str
+        One a body; colours by which STEP knows them.
+    face_names : sequence of str
+        One a face, body by body.
+    """
+
+    names: Sequence[str] = ()
+    colours: Sequence[str] = ()
+    face_names: Sequence[str] = ()
+
+
+UNLABELLED = BodyLabels()
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +193,7 @@ class _Products:
         kind = "ADVANCED_BREP" if part.bodies[0].solid else "MANIFOLD_SURFACE"
         product.representation = self.text.add(f"{kind}_SHAPE_REPRESENTATION('',{items},#{product.context})")
         self._define(product)
-        if part.colour:
+        if part.colour or part.body_colours:
             self._colour(part, numbers, product.context)
         if part.size is not None:
             self.validate(product.shape, product.context, part.size)
@@ -243,11 +266,11 @@ class _Products:
         add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{shape})")
 
     def _colour(self, part: StepPart, numbers: list[tuple[int, list[int]]], context: int) -> None:
-        whole = self._style(part.colour, with_lines=True)
         colours, styled = iter(part.face_colours), []
-        for solid, faces in numbers:
+        for (solid, faces), own in zip(numbers, part.body_colours or [part.colour] * len(numbers), strict=True):
+            whole = self._style(own, with_lines=True)
             of_solid = self.text.add(f"STYLED_ITEM('color',(#{whole}),#{solid})")
-            others = ((face, colour) for face, colour in zip(faces, colours, strict=False) if colour != part.colour)
+            others = ((face, colour) for face, colour in zip(faces, colours, strict=False) if colour != own)
             styled += [
                 of_solid,
                 *(

@@ -201,6 +201,14 @@ class BoundaryFace:
             raise KernelError("an edge of the lattice all but meets an edge of the part")
         return inside
 
+    def comes_near(self, places: Floats, distance: float) -> Booleans:
+        """Mask of the parameters (n, 2) that belong to the face, or are some mm beside it, a little more or less."""
+        low, high = self.range
+        scale = np.maximum(high - low, np.finfo(float).tiny)
+        sides = ((end - low) / scale for end in self._sides(_SAGS[0]))
+        inside, nearest = within_polygons((self.unwound(places) - low) / scale, *sides)
+        return np.asarray(inside | (nearest * np.max(self.high - self.low) <= _DOUBTFUL * distance))
+
     def _sides(self, sag: float) -> tuple[Floats, Floats]:
         """Both ends of each side of the polygons along the border."""
         if sag not in self._polygons:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import dot
 from gyroid_cad.nurbs.basis import basis
+from gyroid_cad.nurbs.roots import foot_step
 from gyroid_cad.nurbs.surface import edge_row, grid_points, point_derivatives
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.wall.offset import SIDES, Wall, side_along
@@ -23,6 +24,9 @@ Booleans = NDArray[np.bool_]
 # Places along each side of the square at which faces are looked at, and how many faces at a time.
 GRID = 33
 _AT_ONCE = 256
+# Along each side, places from the nearest of which the foot of a perpendicular is looked for; in so many steps; and
+# how far beyond the rim.
+_STARTS, _FOOT_STEPS, _REACHED = 7, 5, 1.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +133,35 @@ class LatticeFaces:
         """Points on an even grid of parameters; shape (m, count, count, 3)."""
         along, wall = np.linspace(-1, 1, count), self.wall
         return grid_points(self.nets[faces], wall.weights, (wall.knots, wall.knots), along, along)
+
+    def heights(self, faces: Integers, points: Floats) -> tuple[Floats, Floats]:
+        """Signed distances of points (m, q, 3) from faces (m,) that go on a little beyond their rims, and the places.
+
+        Returns
+        -------
+        heights : ndarray, shape (m, q)
+            In mm, positive where the face's own normal points to.
+        places : ndarray, shape (m, q, 2)
+            Parameters of the feet of the perpendiculars.
+        """
+        starts = np.linspace(-1, 1, _STARTS)
+        used, which = np.unique(faces, return_inverse=True)
+        grid = self.on_grid(used, _STARTS).reshape(len(used), _STARTS**2, 3)[which]
+        nearest = np.stack(
+            [np.argmin(np.sum((grid - points[:, k, None]) ** 2, axis=-1), axis=1) for k in range(points.shape[1])],
+            axis=1,
+        )
+        places = np.stack([starts[nearest // _STARTS], starts[nearest % _STARTS]], axis=-1)
+        for step in range(_FOOT_STEPS + 1):
+            last = step == _FOOT_STEPS
+            x, du, dv, *bends = self.derivatives(faces, places[..., 0], places[..., 1], 1 if last else 2)
+            if last:
+                break
+            u, v, sound = foot_step(points - x, du, dv, *bends)
+            change = np.where(sound[..., None], np.stack([u, v], axis=-1), 0.0)
+            places = np.clip(places + np.clip(change, -0.3, 0.3), -_REACHED, _REACHED)
+        normals = np.cross(du, dv)
+        return dot(points - x, normals) / np.linalg.norm(normals, axis=-1), places
 
 
 @dataclass(frozen=True, eq=False)

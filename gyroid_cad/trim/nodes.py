@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 
 from gyroid_cad.common.arrays import dot, grouped
 from gyroid_cad.errors import KernelError
-from gyroid_cad.nurbs.roots import foot_step, roots
+from gyroid_cad.nurbs.roots import roots
 from gyroid_cad.trim.boundary import Boundary
 from gyroid_cad.trim.edge_crossings import square_points
 from gyroid_cad.trim.lattice_faces import LatticeFaces, Pairs
 
-__all__ = ["PartNodes", "RimNodes", "part_nodes", "rim_nodes", "twin_nodes"]
+__all__ = ["PartNodes", "RimNodes", "edge_segments", "part_nodes", "rim_nodes", "twin_nodes"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,9 +30,8 @@ _RIM_SAMPLES = 65
 _LOOKED_AT = 9
 # The sine of an angle at which an edge touches a face, and how near a corner a node may be, in parts of the edge.
 _TOUCHING, _AT_CORNER = 1e-6, 1e-6
-# Places of a face, along each side, from the nearest of which the foot of a perpendicular is looked for, in so many
-# steps; how far beyond its rim; and parts of a segment at whose ends.
-_STARTS, _FOOT_STEPS, _REACHED, _PARTS, _MARGIN = 7, 5, 1.15, 5, 0.2
+# Parts of a segment at whose ends heights above a face are measured.
+_PARTS, _MARGIN = 5, 0.2
 _SEGMENT, _TURN, _MOST_SEGMENTS = 0.1, 0.15, 4096
 _NEWTON_STEPS = 20
 _AT_ONCE = 2**12
@@ -198,7 +197,7 @@ def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
     none = PartNodes(integers, integers, numbers, numbers > 0, np.zeros((0, 2)), np.zeros((0, 3)))
     if not len(faces):
         return none
-    edge, low, high, start, end = _segments(boundary, faces.size)
+    edge, low, high, start, end = edge_segments(boundary, faces.size)
     if not len(edge):
         return none
     face, segment = _near(faces, start, end)
@@ -208,7 +207,7 @@ def part_nodes(faces: LatticeFaces, boundary: Boundary) -> PartNodes:
     return _converged(faces, boundary, edge[segment][row], face[row], along, u, v)
 
 
-def _segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats, Floats, Floats]:
+def edge_segments(boundary: Boundary, size: float) -> tuple[Integers, Floats, Floats, Floats, Floats]:
     """Edges of the part as straight segments: their edges, parameters of both ends, and both ends."""
     edges, lows, highs = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], [np.zeros(0)]
     starts, ends = [np.zeros((0, 3))], [np.zeros((0, 3))]
@@ -260,13 +259,13 @@ def _tried(
         rows = np.arange(first, min(first + _AT_ONCE, len(face)))
         ends = np.stack([low[rows], high[rows]], axis=1)
         points, _ = boundary.along_edges(edge[rows], ends)
-        heights, _ = _heights(faces, face[rows], points)
+        heights, _ = faces.heights(face[rows], points)
         length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
         # No place of a segment is further from one of its ends than its length.
         rows = rows[np.abs(heights).min(axis=1) <= length]
         t = low[rows, None] + parts * (high - low)[rows, None]
         points, _ = boundary.along_edges(edge[rows], t)
-        heights, places = _heights(faces, face[rows], points)
+        heights, places = faces.heights(face[rows], points)
         above = heights > 0
         row, index = np.nonzero(above[:, 1:] != above[:, :-1])
         before, after = heights[row, index], heights[row, index + 1]
@@ -287,28 +286,6 @@ def _between(
     along = t[row, index] + share * (t[row, index + 1] - t[row, index])
     place = places[row, index] + share[:, None] * (places[row, index + 1] - places[row, index])
     return rows[row], along, place[:, 0], place[:, 1]
-
-
-def _heights(faces: LatticeFaces, face: Integers, points: Floats) -> tuple[Floats, Floats]:
-    """Signed distances of points (m, q, 3) from faces (m,) that go on a little beyond their rims, and the places."""
-    along = np.linspace(-1, 1, _STARTS)
-    starts = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
-    used, which = np.unique(face, return_inverse=True)
-    grid = faces.on_grid(used, _STARTS).reshape(len(used), _STARTS**2, 3)[which]
-    nearest = np.stack(
-        [np.argmin(np.sum((grid - points[:, k, None]) ** 2, axis=-1), axis=1) for k in range(points.shape[1])], axis=1
-    )
-    places = starts[nearest]
-    for step in range(_FOOT_STEPS + 1):
-        last = step == _FOOT_STEPS
-        x, du, dv, *bends = faces.derivatives(face, places[..., 0], places[..., 1], 1 if last else 2)
-        if last:
-            break
-        u, v, sound = foot_step(points - x, du, dv, *bends)
-        change = np.where(sound[..., None], np.stack([u, v], axis=-1), 0.0)
-        places = np.clip(places + np.clip(change, -0.3, 0.3), -_REACHED, _REACHED)
-    normals = np.cross(du, dv)
-    return dot(points - x, normals) / np.linalg.norm(normals, axis=-1), places
 
 
 def _converged(

@@ -19,8 +19,9 @@ __all__ = ["SectionCurve", "fitted_sections"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
-_STATIONS = (8, 12, 16, 20, 24, 28, 32, 40, 48, 64, 96, 128)
+# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough. Short
+# curves, by their length in the square, are tried with the fewest: receivers take close knots for tiny segments.
+_STATIONS, _USUAL, _SHORT = (3, 4, 6, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64, 96, 128), 8, 0.2
 _CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
 # With what power of their number the distance falls.
 _ORDER = 4
@@ -126,7 +127,8 @@ def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats]
     """Control points, in the square, in space and on the part's face, and how far the three are apart."""
     control: list[Floats] = [np.zeros((0, 7))] * len(paths.pair)
     deviation = np.full(len(paths.pair), np.inf)
-    counts = np.full(len(paths.pair), _STATIONS[0])
+    lengths = [np.linalg.norm(np.diff(places, axis=0), axis=1).sum() for places in paths.places]
+    counts = np.where(np.array(lengths) < _SHORT, _STATIONS[0], _USUAL)
     while np.any(counts):
         for count, left in grouped(counts):
             if not count:

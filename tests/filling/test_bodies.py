@@ -1,145 +1,125 @@
-"""Parts of several bodies: each is filled by itself, chosen by its name, mended where it is faulty."""
+"""Wall, two fluids and skin of a filled part as bodies that share the faces between them."""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
-from typing import Any
 
-import build123d as bd
 import cadquery as cq
-import numpy as np
 import pytest
-from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 
-from gyroid_cad.errors import IslandsWarning, ParameterError, PartWarning
+from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.filling.filled import Filled
-from gyroid_cad.filling.part import bodies_of
+from gyroid_cad.kernel.assembly import read_bodies
+from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.surface.fit import FitSettings
 
-CELL, DENSITY, SIDE = 8.0, 0.2, 4.0
-COARSE = FitSettings(4)
+CELL, FIT = 6.0, FitSettings(5)
 
 
-def cube(x: float = 0.0, side: float = SIDE) -> cq.Workplane:
-    return cq.Workplane().box(side, side, side, centered=False).translate((x, 0, 0))
+def ball() -> cq.Workplane:
+    return cq.Workplane().sphere(4.5)
 
 
-def filled(part: Any, **given: Any) -> Filled:
-    return fill(part, CELL, density=DENSITY, fit=COARSE, **given)
+def bodies_of(part: cq.Workplane, **given: object) -> Filled:
+    return fill(part, CELL, density=0.3, kind="bodies", fit=FIT, **given)
 
 
-def unsewn(sides: int) -> cq.Solid:
-    """A box of so many faces, each of which has edges of its own."""
-    faces = [cq.Face(BRepBuilderAPI_Copy(face.wrapped).Shape()) for face in cube().faces().vals()[:sides]]
-    builder, solid = cq.occ_impl.shapes.BRep_Builder(), cq.occ_impl.shapes.TopoDS_Solid()
-    shell = cq.occ_impl.shapes.TopoDS_Shell()
-    builder.MakeShell(shell)
-    for face in faces:
-        builder.Add(shell, face.wrapped)
-    builder.MakeSolid(solid)
-    builder.Add(solid, shell)
-    return cq.Solid(solid)
+def open_box() -> Filled:
+    return bodies_of(cq.Workplane().box(8, 7, 6.5), skin=0.7, openings=[">X", "<X"])
 
 
-@pytest.mark.parametrize("second", [3 * SIDE, SIDE], ids=["apart", "touching"])
-def test_each_body_is_filled_by_itself_and_is_no_island_of_the_other(second: float) -> None:
-    # Of either two chips at its corners are dropped, as of a cube alone.
-    with pytest.warns(IslandsWarning, match="^not connected to the largest piece: 4 islands"):
-        both = filled(cube().add(cube(second)), drop_islands=True).report
-    alone = [filled(cube(x)).report for x in (0, second)]
-    assert (both.bodies, both.solids, both.islands) == (2, 2, 0)
-    for name in ("volume", "area", "part_volume", "faces", "cut_patches", "dropped"):
-        assert getattr(both, name) == pytest.approx(sum(getattr(report, name) for report in alone))
-    assert both.density == both.volume / both.part_volume
+MADE = {"ball": lambda: bodies_of(ball()), "box with skin and openings": open_box}
 
 
-def test_bodies_that_overlap_are_united_and_the_report_says_so() -> None:
-    with pytest.warns(PartWarning, match="have 32 mm3 in common: united"):
-        made = filled(cube().add(cube(SIDE / 2))).report
-    assert made.part_volume == pytest.approx(1.5 * SIDE**3)
-    assert (made.bodies, made.solids) == (1, 1)
-    assert "solid 1 of 2 and solid 2 of 2 have 32 mm3 in common: united" in str(made)
+@pytest.fixture(scope="module", params=MADE)
+def made(request: pytest.FixtureRequest) -> Filled:
+    return MADE[request.param]()
 
 
-def assembly_file(folder: Path) -> Path:
-    sub = cq.Assembly(name="sub").add(cube(), name="nut").add(cube(20), name="bolt")
-    whole = cq.Assembly(name="whole").add(sub, loc=cq.Location((0, 0, 50))).add(cube(40, 6), name="plate")
-    whole.export(str(folder / "whole.step"))
-    return folder / "whole.step"
+def test_bodies_fill_the_part_together(made: Filled) -> None:
+    volume = sum(size.volume for sizes in made.sizes.values() for size in sizes)
+    assert volume == pytest.approx(made.report.part_volume, rel=1e-9)
+    assert all(is_valid(shape) and topology(shape).closed for shape in made.domains.values())
+    assert made.report.volumes["fluid-a"] > 0.2 * volume
 
 
-@pytest.mark.parametrize(("chosen", "volumes"), [("bolt", [64]), (["plate", "nut"], [216, 64]), (3, [216])])
-def test_bodies_of_an_assembly_are_chosen_by_the_names_or_numbers_of_its_file(
-    chosen: Any, volumes: list[float], tmp_path: Path
-) -> None:
-    parts, _ = bodies_of(assembly_file(tmp_path), chosen)
-    assert [part.volume for _, part in parts] == pytest.approx(volumes)
+def test_what_is_between_two_bodies_is_one_face_that_they_use_from_either_side(made: Filled) -> None:
+    uses: dict[int, list[tuple[str, str, object]]] = {}
+    order: list[object] = []
+    for name, shape in made.domains.items():
+        faces = list(parts_of(shape, TopAbs_FACE))
+        assert len(faces) == len(made.face_names[name])
+        for face, called in zip(faces, made.face_names[name], strict=True):
+            number = next((k for k, other in enumerate(order) if face.IsSame(other)), len(order))
+            if number == len(order):
+                order.append(face)
+            uses.setdefault(number, []).append((name, called, face.Orientation()))
+    for users in uses.values():
+        names, called, orientations = zip(*users, strict=True)
+        shared = called[0] in ("wall/a", "wall/b", "skin/inside")
+        assert len(users) == (2 if shared else 1)
+        assert len(set(called)) == 1
+        assert len(set(orientations)) == len(users) == len(set(names))
+        if shared:
+            assert {"wall/a": {"wall", "fluid-a"}, "wall/b": {"wall", "fluid-b"}}.get(called[0], set(names)) == set(
+                names
+            )
 
 
-def test_a_body_of_an_assembly_stands_where_the_assembly_has_it(tmp_path: Path) -> None:
-    ((title, bolt),) = bodies_of(assembly_file(tmp_path), ["bolt"])[0]
-    assert title == "solid 2 of 3 (bolt)"
-    np.testing.assert_allclose(bolt.low, [20, 0, 50], atol=1e-6)
+def test_a_file_has_the_bodies_and_their_faces_by_name(made: Filled, tmp_path: Path) -> None:
+    path = tmp_path / "bodies.step"
+    made.write(path)
+    shapes, _ = read_bodies(path)
+    assert sum(1 for shape in shapes for _ in parts_of(shape, TopAbs_SOLID)) == made.report.solids
+    text = path.read_text()
+    for name, called in made.face_names.items():
+        assert f"BREP('{name}'" in text.replace("WITH_VOIDS", "BREP")
+        for face, count in Counter(called).items():
+            assert text.count(f"ADVANCED_FACE('{face}'") >= count
+    assert "DRAUGHTING_PRE_DEFINED_COLOUR('blue')" in text
 
 
-def test_assemblies_of_hosts_have_names_too() -> None:
-    of_cadquery = (
-        cq.Assembly(name="pair").add(cube(), name="left").add(cube(9), name="right", loc=cq.Location((1, 0, 0)))
-    )
-    left, right = bd.Box(3, 3, 3), bd.Pos(20, 0, 0) * bd.Box(2, 2, 2)
-    left.label, right.label = "left", "right"
-    of_build123d = bd.Compound(label="pair", children=[left, right])
-    for pair, low, volume in ((of_cadquery, 10, SIDE**3), (of_build123d, 19, 8)):
-        ((_, part),) = bodies_of(pair, ["right"])[0]
-        assert (part.low[0], part.volume) == pytest.approx((low, volume), abs=1e-6)
+def test_bodies_are_refused_what_they_cannot_be(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="bodies share exact faces"):
+        fill(ball(), CELL, density=0.3, kind="bodies", route="triangles")
+    with pytest.raises(ParameterError, match="fill the part together"):
+        fill(ball(), CELL, density=0.3, kind="bodies", drop_islands=True)
 
 
-def test_a_name_that_no_body_has_is_refused_with_those_that_there_are() -> None:
-    pair = cq.Assembly(name="pair").add(cube(), name="left").add(cube(9), name="right")
-    with pytest.raises(ParameterError) as refused:
-        filled(pair, solids=["middle"])
-    assert str(refused.value) == (
-        "solids = 'middle': expected a name or a number of the part's solids: "
-        "solid 1 of 2 (pair/left, left), solid 2 of 2 (pair/right, right)"
-    )
-
-
-def test_an_opening_is_one_of_the_body_whose_face_it_is() -> None:
-    pair = cube().add(cube(9, 5))
-    both = filled(pair, skin=0.5, openings=[">Z"]).report
-    closed, opened = filled(cube(), skin=0.5).report, filled(cube(9, 5), skin=0.5, openings=[">Z"]).report
-    assert both.volume == pytest.approx(closed.volume + opened.volume)
+def test_where_one_fluid_flows_in_the_channels_of_the_other_are_closed() -> None:
+    part = cq.Workplane().box(9, 8, 6)
+    made = bodies_of(part, skin=0.7, openings=["a:<X", "a:>X", "b:<Y", ("b", (0.0, 4.0, 0.0))])
+    assert sum(made.report.volumes.values()) == pytest.approx(made.report.part_volume, rel=1e-9)
+    for name, axis, size in (("fluid-a", 0, 9), ("fluid-b", 1, 8)):
+        boxes = [
+            cq.Face(face).BoundingBox()
+            for face, called in zip(parts_of(made.domains[name], TopAbs_FACE), made.face_names[name], strict=True)
+            if called.startswith(f"{name[-1]}:")
+        ]
+        ends = {(round((box.xmin, box.ymin)[axis], 6), round((box.xmax, box.ymax)[axis], 6)) for box in boxes}
+        assert ends == {(-size / 2, -size / 2), (size / 2, size / 2)}
+        # The other way it ends at the skin.
+        other = part.faces(("<Y", "<X")[axis]).val()
+        assert other.distance(cq.Shape.cast(made.domains[name])) == pytest.approx(0.7, abs=1e-6)
+    # By the kernel's own integrals, which know nothing of ours.
+    wall = cq.Shape.cast(made.domains["wall"])
+    assert wall.isValid()
+    assert wall.Volume() == pytest.approx(made.report.volume, rel=1e-4)
 
 
 @pytest.mark.parametrize(
-    ("part", "words"),
+    ("openings", "message"),
     [
-        (unsewn(6), "its solid has 24 open edges, the first on face 1 at (0, 0, 2) mm: repaired"),
-        (cube().val().Shells()[0], "its faces are no solid: repaired"),
-        (cq.Solid(cube().val().wrapped.Reversed()), "its solid is inside out: repaired"),
+        (["a:>X", ">Y"], "a fluid as well"),
+        (["a:>X"], "one for fluid b too"),
+        (["a:>X", "b:>X"], "each face open for one fluid"),
     ],
-    ids=["unsewn", "shell", "inside out"],
 )
-def test_what_the_kernels_tools_can_mend_is_mended_and_said(part: Any, words: str) -> None:
-    with pytest.warns(PartWarning) as said:
-        made = filled(part).report
-    assert made.remarks == (words,)
-    assert [str(warning.message) for warning in said if warning.category is PartWarning] == [words]
-    assert made.part_volume == pytest.approx(SIDE**3)
-
-
-def test_what_cannot_be_mended_is_refused_for_a_face_and_a_place() -> None:
-    with pytest.raises(ParameterError, match=r"^part = 'solid': expected a closed solid: its solid has 20 open edges"):
-        filled(unsewn(5))
-    one_missing = cq.Workplane(obj=cq.Compound.makeCompound([cube(20).val(), unsewn(5)]))
-    with pytest.raises(ParameterError, match=r"solid 2 of 2 has 20 open edges, the first on face 1 at \(0, 0, 2\) mm"):
-        filled(one_missing)
-
-
-@pytest.mark.parametrize("route", ["brep", "triangles"])
-def test_a_solid_whose_faces_lie_on_one_another_holds_nothing_to_fill(route: Any, tmp_path: Path) -> None:
-    half = cq.Workplane().ellipseArc(14, 8, -90, 90, rotation_angle=0, startAtCurrent=False).close()
-    cq.exporters.export(half.revolve(360, (0, -8, 0), (0, 8, 0)), str(tmp_path / "egg.step"))
-    with pytest.raises(ParameterError, match="of positive volume: its solid holds nothing, for its faces lie on one"):
-        filled(tmp_path / "egg.step", route=route)
+def test_openings_for_fluids_are_refused_where_they_contradict(openings: list[str], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        bodies_of(ball() if len(openings) == 1 else cq.Workplane().box(9, 8, 6), skin=0.7, openings=openings)
+    with pytest.raises(ParameterError, match="unless kind is"):
+        fill(ball(), CELL, density=0.3, skin=0.7, openings=["a:>X", "b:<X"])

@@ -36,6 +36,7 @@ TUBE = USUAL.tube
 CELL, WALL, RADIUS, HEIGHT = 10.0, 0.9, 1.8, 3.4
 PEG = np.pi * RADIUS**2 * HEIGHT
 COARSE = FitSettings(5)
+HOME = (0.0, 0.0, 0.0)
 
 
 def peg(x: float = 5.0) -> cq.Workplane:
@@ -50,7 +51,8 @@ def ball() -> cq.Workplane:
 @lru_cache(maxsize=8)
 def filled(kind: str = "sheet", density: float | None = None) -> Filled:
     wall = WALL if density is None else None
-    return fill(peg(), CELL, wall, density, kind, fit=COARSE, material_density=2.7)
+    # Given an origin, the lattice stands there, and does not move clear of what it all but touches.
+    return fill(peg(), CELL, wall, density, kind, HOME, fit=COARSE, material_density=2.7)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +205,8 @@ def test_whole_cells_are_as_dense_as_was_asked_wherever_they_begin() -> None:
 # No corner of the lattice lies in a side of the box: the lattice would be shifted, and the surface another.
 @pytest.mark.parametrize("part", [ball(), cq.Workplane().box(4, 5, 3).translate((5.3, 4.2, 6.1))], ids=["ball", "box"])
 def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: cq.Workplane, tmp_path: Path) -> None:
-    surface, wall = fill(part, CELL, kind="surface", fit=COARSE), fill(part, CELL, 0.05, fit=COARSE)
+    given = {"origin": HOME, "fit": COARSE}
+    surface, wall = fill(part, CELL, kind="surface", **given), fill(part, CELL, 0.05, **given)
     report = surface.report
     assert (report.volume, report.solids, report.min_wall, report.closed) == (0, 0, None, False)
     # A thin wall is its mid-surface times its thickness.
@@ -217,7 +220,7 @@ def test_the_bare_surface_has_half_the_area_of_a_thin_wall_and_no_volume(part: c
 
 
 def test_a_field_that_does_not_vary_is_a_number() -> None:
-    number, field = filled().report, fill(peg(), CELL, f"{WALL} + 0*x", fit=COARSE).report
+    number, field = filled().report, fill(peg(), CELL, f"{WALL} + 0*x", origin=HOME, fit=COARSE).report
     assert field.volume == pytest.approx(number.volume, rel=1e-3)
 
 
@@ -355,7 +358,7 @@ def test_solids_that_meet_in_an_edge_are_no_reason_to_refuse() -> None:
 def test_a_lattice_from_far_away_fills_a_part_as_one_moved_by_whole_cells_does() -> None:
     given = {"thickness": "0.8 + 0.05*x", "fit": COARSE, "tolerance": 1e-3}
     far = fill(ball(), CELL, origin=(9_999_990.0, -9_999_990.0, 1e7), **given).report
-    near = fill(ball(), CELL, **given).report
+    near = fill(ball(), CELL, origin=HOME, **given).report
     assert (far.volume, far.area) == pytest.approx((near.volume, near.area), rel=1e-6)
 
 
@@ -380,7 +383,7 @@ def test_where_the_kernel_fails_the_lattice_is_shifted_a_little_and_the_report_s
 
     only_by(monkeypatch, "booleans")
     monkeypatch.setattr(gyroid_cad.filling.roads, "split_by_region", failing_once)
-    report = fill(peg(), CELL, WALL, fit=COARSE).report
+    report = fill(peg(), CELL, WALL, origin=HOME, fit=COARSE).report
     assert len(calls) == 2
     assert 0 < np.linalg.norm(report.shift) < 0.01 * CELL
     assert report.valid

@@ -22,7 +22,7 @@ from gyroid_cad.trim.islands import SMALL_ISLAND
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.wall.areas import ShapeSize
 
-__all__ = ["Crossed", "FaceNames", "Made", "without_chips"]
+__all__ = ["Crossed", "FaceNames", "Made", "merged_chips"]
 
 Floats = NDArray[np.float64]
 # Solids by the name of what they are.
@@ -135,7 +135,7 @@ class FaceNames:
         return f"{body}/opening {sum(self._hollow.opened[: origin + 1])}"
 
 
-def without_chips(bodies: Bodies, volume_of: Callable[[KernelShape], float], one_cell: float) -> Bodies:
+def merged_chips(bodies: Bodies, volume_of: Callable[[KernelShape], float], one_cell: float) -> Bodies:
     """Return bodies of which small pieces that are unconnected have been joined to what is round them.
 
     A chip of the wall becomes fluid, a pocket of fluid wall: no mesher is given pieces that hold nothing, and together

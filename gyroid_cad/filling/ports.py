@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.filling.bodies import Crossed, Made, without_chips
+from gyroid_cad.filling.bodies import Crossed, Made, merged_chips
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.roads import crossed_by, patches_of
@@ -214,7 +214,7 @@ class PortedFilling:
             for name, fluid in made.items():
                 pieces, faces = fluid.crossed.pieces, fluid.crossed.faces
                 found[name] = list(bounded_solids(pieces, faces, fluid.wanted_at, volume_of))
-            found = without_chips(found, volume_of, self.cell_size**3)
+            found = merged_chips(found, volume_of, self.cell_size**3)
             if not all(found.values()):
                 raise KernelError("nothing of a fluid lies in the part")
         domains = {name: [self._made(solid, sizes, made, name) for solid in some] for name, some in found.items()}

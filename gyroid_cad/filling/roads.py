@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
-from gyroid_cad.filling.bodies import Crossed, FaceNames, Made, without_chips
+from gyroid_cad.filling.bodies import Crossed, FaceNames, Made, merged_chips
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import SKIN, Region
 from gyroid_cad.kernel.boundary import ReadBoundary
@@ -174,7 +174,7 @@ def _bodies(job: Job, infill: Infill, crossed: Crossed) -> dict[str, list[Made]]
             found[named.fluid_of(solid)].append(solid)
         if job.hollow is not None:
             found[SKIN] = list(job.hollow.skin_solids(pieces, volume_of))
-        found = without_chips(found, volume_of, job.cell_size**3)
+        found = merged_chips(found, volume_of, job.cell_size**3)
     return {name: [named.made(shape, name, sizes) for shape in some] for name, some in found.items()}
 
 

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.bodies import Crossed, Made, merged_chips
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.part import Filling, Outcome
-from gyroid_cad.filling.roads import Crossed, Made, crossed_by, patches_of
+from gyroid_cad.filling.roads import crossed_by, patches_of
 from gyroid_cad.filling.wanted import BODIES, FLUID_A, FLUID_B, SKIN, WALL, Region
 from gyroid_cad.kernel.check import faces_of, is_valid, topology
 from gyroid_cad.kernel.compat import NumberedShapes, as_face
@@ -204,17 +205,19 @@ class PortedFilling:
         sizes = FaceSizes(
             [face for one in some for face in one.measured], joined(*(one.measures for one in some)), some[0].middle
         )
-        domains: dict[str, list[Made]] = {WALL: []}
+
+        def volume_of(shell: KernelShape) -> float:
+            return sizes.of(shell).volume
+
         with self._first.timed("join"):
+            found: dict[str, list[KernelShape]] = {WALL: list(solids_of(self._wall_faces(made), volume_of))}
             for name, fluid in made.items():
-                solids = bounded_solids(
-                    fluid.crossed.pieces, fluid.crossed.faces, fluid.wanted_at, lambda shell: sizes.of(shell).volume
-                )
-                domains[name] = [self._made(solid, sizes, made, name) for solid in solids]
-                if not solids:
-                    raise KernelError(f"nothing of {name} lies in the part")
-            walls = solids_of(self._wall_faces(made), lambda shell: sizes.of(shell).volume)
-            domains[WALL] = [self._made(solid, sizes, made, WALL) for solid in walls]
+                pieces, faces = fluid.crossed.pieces, fluid.crossed.faces
+                found[name] = list(bounded_solids(pieces, faces, fluid.wanted_at, volume_of))
+            found = merged_chips(found, volume_of, self.cell_size**3)
+            if not all(found.values()):
+                raise KernelError("nothing of a fluid lies in the part")
+        domains = {name: [self._made(solid, sizes, made, name) for solid in some] for name, some in found.items()}
         self._require_sum(domains)
         return domains
 

@@ -24,7 +24,7 @@ from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Regi
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import is_coarse, require_near_origin
-from gyroid_cad.mesh.triangles.storing import joined_meshes, merged_chips, storable_triangles
+from gyroid_cad.mesh.triangles.storing import joined_meshes, without_chips, storable_triangles
 from gyroid_cad.mesh.triangles.triangulation import triangulated
 from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, triangles_picture
@@ -394,5 +394,5 @@ def _stored(
     # Where single precision is too coarse only files are written that have more.
     single = not is_coarse(float(np.abs(vertices).max()), size, deviation)
     stored = storable_triangles(vertices, triangles, single)
-    vertices, triangles, solids = merged_chips(*stored, len(shells), speck)
+    vertices, triangles, solids = without_chips(*stored, len(shells), speck)
     return (vertices, triangles), solids

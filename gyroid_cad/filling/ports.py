@@ -281,10 +281,8 @@ class _Fluid:
             if is_open and origin not in reached:
                 face = next(face for face, own in zip(pieces.boundary, pieces.origins, strict=True) if own == origin)
                 place = shown_place(corners_of(box_round([face])).mean(axis=0))
-                letter = self.name[-1]
-                raise ParameterError(
-                    "openings", f"{letter}:", f"faces that its channels reach, not the one round {place}"
-                )
+                accepted = f"faces that the fluid's channels reach, not the one round {place}"
+                raise ParameterError("openings", f"{self.name[-1]}:", accepted)
 
     def opened_faces(self) -> list[KernelFace]:
         """Faces of the part that are open for this fluid."""

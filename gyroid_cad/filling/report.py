@@ -235,8 +235,8 @@ def fluid_report(name: str, volume: float, wetted: float, pieces: int) -> FluidR
 
 
 def _joint_fluid(some: Sequence[FluidReport]) -> FluidReport:
-    sums = (sum(getattr(one, name) for one in some) for name in ("volume", "wetted_area"))
-    return fluid_report(some[0].name, *sums, sum(one.pieces for one in some))
+    volume, wetted = (sum(getattr(one, name) for one in some) for name in ("volume", "wetted_area"))
+    return fluid_report(some[0].name, volume, wetted, sum(one.pieces for one in some))
 
 
 def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:

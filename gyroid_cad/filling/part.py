@@ -16,9 +16,10 @@ from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of
 from gyroid_cad.common.progress import Progress, report_progress, timed
 from gyroid_cad.errors import KernelError, ParameterError
+from gyroid_cad.filling.bodies import Made
 from gyroid_cad.filling.extent import PartExtent
 from gyroid_cad.filling.infill import Infill
-from gyroid_cad.filling.roads import Made, Road, taken
+from gyroid_cad.filling.roads import Road, taken
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named

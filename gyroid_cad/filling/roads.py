@@ -6,62 +6,40 @@ The first two know where faces cross from numbers alone; the kernel is asked whe
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.processes import beside
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import KernelError
+from gyroid_cad.filling.bodies import Crossed, FaceNames, Made, merged_chips
 from gyroid_cad.filling.infill import Infill
-from gyroid_cad.filling.wanted import SKIN, WALL, Region
+from gyroid_cad.filling.wanted import SKIN, Region
 from gyroid_cad.kernel.boundary import ReadBoundary
-from gyroid_cad.kernel.check import faces_of, measure
-from gyroid_cad.kernel.compat import NumberedShapes
-from gyroid_cad.kernel.crossed import FaceSizes, crossed_pieces
+from gyroid_cad.kernel.check import measure
+from gyroid_cad.kernel.crossed import crossed_pieces
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.regions import split_by_region
 from gyroid_cad.kernel.shells import VolumeOf, connected_shells
 from gyroid_cad.kernel.skin import Hollow
-from gyroid_cad.kernel.solid import KernelFace, KernelShape
+from gyroid_cad.kernel.solid import KernelShape
 from gyroid_cad.kernel.split import Pieces, bounded_solids, parted_solids
 from gyroid_cad.kernel.trimmed import build_trimmed, hollowed_by
 from gyroid_cad.trim.box import TrimmedWall, cut_to_box
 from gyroid_cad.trim.crossing import cross_part
 from gyroid_cad.trim.measures import PieceMeasures, boundary_measures, joined, lattice_measures, whole_measures
-from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.covering import CROSSING, INSIDE
 
-__all__ = ["Crossed", "Job", "Made", "Road", "crossed_by", "patches_of", "taken"]
+__all__ = ["Job", "Road", "crossed_by", "patches_of", "taken"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 Road = Literal["sections", "crossings", "booleans", "bodies"]
 # Solids by the name of their region; patches that the part's boundary may cross; and those that lie wholly inside.
-Found = tuple[dict[str, list["Made"]], int, int]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Made:
-    """A solid, or a shell of the bare surface, with its volume in mm3, its area in mm2, and its centroid in mm.
-
-    There is no centroid where the kernel measured some of it, which is not as exact. Names of its faces, if it has any,
-    are in the order in which the kernel counts them.
-    """
-
-    shape: KernelShape
-    volume: float
-    area: float
-    centroid: Point | None = None
-    face_names: tuple[str, ...] = ()
-
-    @property
-    def size(self) -> ShapeSize:
-        return ShapeSize(self.volume, self.area, self.centroid)
+Found = tuple[dict[str, list[Made]], int, int]
 
 
 class Job(Protocol):
@@ -178,40 +156,10 @@ def patches_of(job: Job, infill: Infill) -> tuple[Integers, Integers]:
     return np.flatnonzero(sides == CROSSING), np.flatnonzero(sides == INSIDE)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Crossed:
-    """Pieces of the core's boundary and of the lattice's faces, faces that nothing cut, and how large they are.
-
-    Attributes
-    ----------
-    pieces : Pieces
-    faces : list of KernelFace
-        Uncut.
-    measures : PieceMeasures
-        Of the pieces of the lattice's faces, of those of the boundary, and of the uncut faces.
-    middle : ndarray, shape (3,)
-        That they are taken about.
-    sides : list of int
-        Of the wall, 0 or 1: on which the pieces of the lattice's faces are, and then the uncut faces.
-    """
-
-    pieces: Pieces
-    faces: list[KernelFace]
-    measures: PieceMeasures
-    middle: Floats
-    sides: list[int]
-
-    @property
-    def measured(self) -> list[KernelFace]:
-        """Faces in the order of their measures."""
-        return [*self.pieces.inside, *self.pieces.boundary, *self.faces]
-
-
 def _bodies(job: Job, infill: Infill, crossed: Crossed) -> dict[str, list[Made]]:
     """The first region, what it leaves on either side of it, and the skin, as bodies that share their faces."""
     wall, *fluids = job.regions
-    pieces, faces = crossed.pieces, crossed.faces
-    sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
+    pieces, faces, sizes = crossed.pieces, crossed.faces, crossed.sizes
 
     def volume_of(shell: KernelShape) -> float:
         return sizes.of(shell).volume
@@ -221,58 +169,17 @@ def _bodies(job: Job, infill: Infill, crossed: Crossed) -> dict[str, list[Made]]
             pieces, faces, lambda point: bool(infill.contains(wall, point[np.newaxis])[0]), volume_of
         )
         found: dict[str, list[KernelShape]] = {wall.name: list(within), **{fluid.name: [] for fluid in fluids}}
-        named = _FaceNames(crossed, job.hollow, {side: fluid.name for fluid in fluids for side, _ in fluid.sides})
+        named = FaceNames(crossed, job.hollow, {side: fluid.name for fluid in fluids for side, _ in fluid.sides})
         for solid in beside:
             found[named.fluid_of(solid)].append(solid)
         if job.hollow is not None:
             found[SKIN] = list(job.hollow.skin_solids(pieces, volume_of))
-    return {
-        name: [_made(shape, sizes.of(shape), named.of(shape, name)) for shape in some] for name, some in found.items()
-    }
-
-
-def _made(shape: KernelShape, size: ShapeSize, names: tuple[str, ...]) -> Made:
-    return Made(shape, size.volume, size.area, size.centroid, names)
-
-
-class _FaceNames:
-    """Names of the faces of bodies, by what is on their other side: a face that two of them share has one."""
-
-    def __init__(self, crossed: Crossed, hollow: Hollow | None, fluids: dict[int, str]) -> None:
-        self._numbers, self._hollow, self._fluids = NumberedShapes(), hollow, fluids
-        self._sides, self._origins = crossed.sides, crossed.pieces.origins
-        for face in [*crossed.pieces.inside, *crossed.faces, *crossed.pieces.boundary]:
-            self._numbers.Add(face)
-
-    def fluid_of(self, solid: KernelShape) -> str:
-        """Name of the fluid that a solid beside the wall is."""
-        numbers = (self._numbers.FindIndex(face) for face in faces_of(solid))
-        side = next((self._sides[number - 1] for number in numbers if 0 < number <= len(self._sides)), None)
-        if side is None:
-            raise KernelError("a piece of the part meets no wall, so that it belongs to neither fluid")
-        return self._fluids[side]
-
-    def of(self, solid: KernelShape, body: str) -> tuple[str, ...]:
-        """Names of the faces of a body, in the order in which the kernel counts them."""
-        return tuple(self._name(int(self._numbers.FindIndex(face)) - 1, body) for face in faces_of(solid))
-
-    def _name(self, number: int, body: str) -> str:
-        if number < 0:
-            return f"{SKIN}/outside"
-        if number < len(self._sides):
-            return f"{WALL}/{self._fluids[self._sides[number]][-1]}"
-        origin = self._origins[number - len(self._sides)]
-        if self._hollow is None:
-            return f"{body}/face {origin + 1}"
-        return (
-            f"{body}/opening {sum(self._hollow.opened[: origin + 1])}"
-            if self._hollow.opened[origin]
-            else f"{SKIN}/inside"
-        )
+        found = merged_chips(found, volume_of, job.cell_size**3)
+    return {name: [named.made(shape, name, sizes) for shape in some] for name, some in found.items()}
 
 
 def _joined_crossed(job: Job, infill: Infill, region: Region, crossed: Crossed) -> list[Made]:
-    sizes = FaceSizes(crossed.measured, crossed.measures, crossed.middle)
+    sizes = crossed.sizes
     with job.timed("join"):
         shapes = _joined(job, infill, region, crossed.pieces, crossed.faces, lambda shell: sizes.of(shell).volume)
         made = [(shape, sizes.of(shape)) for shape in shapes]

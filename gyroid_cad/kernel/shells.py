@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face
 from gyroid_cad.kernel.extent import box_round
 
-__all__ = ["Use", "VolumeOf", "connected_shells", "inner_point", "lies_in", "solids_of", "users_of"]
+__all__ = ["Use", "VolumeOf", "connected_shells", "fused_solids", "inner_point", "lies_in", "solids_of", "users_of"]
 
 VolumeOf = Callable[[TopoDS_Shape], float]
 
@@ -53,6 +54,22 @@ def solids_of(faces: Sequence[TopoDS_Face], volume_of: VolumeOf | None = None) -
         raise KernelError("the pieces of the part and of the lattice do not close: an edge is not shared by two")
     shells = [_shell([faces[index] for index in group]) for group in _grouped(len(faces), users)]
     return _solids(shells, volume_of)
+
+
+def fused_solids(solids: Iterable[TopoDS_Shape], volume_of: VolumeOf | None = None) -> list[TopoDS_Solid]:
+    """Solids as one, where they share faces: those fall away.
+
+    Raises
+    ------
+    KernelError
+        If what is left does not close.
+    """
+    faces, numbers, times = [], NumberedShapes(), Counter[int]()
+    for solid in solids:
+        for face in parts_of(solid, TopAbs_FACE):
+            faces.append(as_face(face))
+            times[numbers.Add(face)] += 1
+    return solids_of([face for face in faces if times[numbers.FindIndex(face)] == 1], volume_of)
 
 
 def connected_shells(faces: Sequence[TopoDS_Face]) -> list[TopoDS_Shell]:

@@ -231,7 +231,7 @@ def test_cells_that_differ_or_are_cut_have_no_part_in_common(settings: dict[str,
 
 @pytest.mark.parametrize("name", ["part.stl", "part.brep", "part.3mf"])
 def test_only_step_holds_an_assembly(name: str, lattice: Lattice, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"an assembly: a file name ending in \.step or \.stp"):
+    with pytest.raises(ParameterError, match=r"an assembly: a file name ending in \.step, \.stp"):
         lattice.write(tmp_path / "part.step", tmp_path / name, instances=True)
     assert not list(tmp_path.iterdir())
 

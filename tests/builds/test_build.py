@@ -216,7 +216,7 @@ def test_the_ending_chooses_the_format_whatever_its_case(one_build: Build, tmp_p
     assert {f"write {name}" for name in names} <= set(one_build.seconds)
 
 
-@pytest.mark.parametrize("name", ["part.dwg", "part", ".step", "part.step.gz", "part.stepx"])
+@pytest.mark.parametrize("name", ["part.dwg", "part", ".step", "part.step.bz2", "part.stepx"])
 def test_an_unknown_ending_is_refused_with_those_that_are_known(tmp_path: Path, name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         require_formats([tmp_path / name])

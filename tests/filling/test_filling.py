@@ -18,10 +18,10 @@ import gyroid_cad.filling.part
 import gyroid_cad.filling.roads
 import gyroid_cad.kernel.regions
 from gyroid_cad.errors import ExportError, IslandsWarning, KernelError, ParameterError, SealedVoidsWarning
+from gyroid_cad.filling.bodies import Made
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.part import part_of
-from gyroid_cad.filling.roads import Made
 from gyroid_cad.filling.wanted import KINDS
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
 from gyroid_cad.kernel.part import measure

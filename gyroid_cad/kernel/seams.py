@@ -19,6 +19,9 @@ from gyroid_cad.kernel.compat import NumberedShapes, ShapesOfShape, as_edge, as_
 
 __all__ = ["without_seams"]
 
+# A curve of the kernel, and where it stands.
+PlacedCurve = tuple[Geom_Curve, TopLoc_Location]
+
 # In mm: how exact a surface's own line is, and the tolerance that an edge along one is given.
 _EXACT, _TOLERANCE = 1e-9, 1e-7
 # Where along an edge that is looked at.
@@ -65,18 +68,18 @@ def _make_exact(divided: TopoDS_Shape, original: TopoDS_Shape) -> None:
             continue
         lines = [_surface_line(edge, as_face(face)) for face in users.FindFromIndex(number)]
         if len(lines) == 2 and lines[0] is not None and lines[1] is not None and _agree(edge, lines[0], lines[1]):
-            builder.UpdateEdge(edge, lines[0], _TOLERANCE)
+            builder.UpdateEdge(edge, *lines[0], _TOLERANCE)
             tolerances.SetTolerance(edge, _TOLERANCE, TopAbs_EDGE)
 
 
 def _is_spline(edge: TopoDS_Edge) -> bool:
-    location = TopLoc_Location()
-    return isinstance(BRep_Tool.Curve_s(edge, location, 0.0, 0.0), Geom_BSplineCurve) and location.IsIdentity()
+    return isinstance(BRep_Tool.Curve_s(edge, TopLoc_Location(), 0.0, 0.0), Geom_BSplineCurve)
 
 
-def _surface_line(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom_Curve | None:
+def _surface_line(edge: TopoDS_Edge, face: TopoDS_Face) -> PlacedCurve | None:
     """The line of one parameter of a surface that an edge runs along with the other as its own; None for others."""
-    on_face, surface = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0), BRep_Tool.Surface_s(face)
+    location = TopLoc_Location()
+    on_face, surface = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0), BRep_Tool.Surface_s(face, location)
     if not isinstance(on_face, Geom2d_Line):
         return None
     way, start = on_face.Direction(), on_face.Location()
@@ -86,14 +89,14 @@ def _surface_line(edge: TopoDS_Edge, face: TopoDS_Face) -> Geom_Curve | None:
         line = surface.VIso(start.Y())
     else:
         return None
-    return line.BasisCurve() if isinstance(line, Geom_TrimmedCurve) else line
+    return line.BasisCurve() if isinstance(line, Geom_TrimmedCurve) else line, location
 
 
-def _agree(edge: TopoDS_Edge, one: Geom_Curve, other: Geom_Curve) -> bool:
+def _agree(edge: TopoDS_Edge, one: PlacedCurve, other: PlacedCurve) -> bool:
     """Tell whether two curves are one over the range of an edge, and the edge's own within its tolerance."""
-    curve = BRepAdaptor_Curve(edge)
+    curve, tolerance = BRepAdaptor_Curve(edge), BRep_Tool.Tolerance_s(edge)
     for t in np.linspace(curve.FirstParameter(), curve.LastParameter(), _LOOKED_AT).tolist():
-        point = one.Value(t)
-        if point.Distance(other.Value(t)) > _EXACT or point.Distance(curve.Value(t)) > BRep_Tool.Tolerance_s(edge):
+        first, second = (line.Value(t).Transformed(location.Transformation()) for line, location in (one, other))
+        if first.Distance(second) > _EXACT or first.Distance(curve.Value(t)) > tolerance:
             return False
     return True

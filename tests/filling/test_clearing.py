@@ -20,6 +20,7 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.clearance import NearMisses, clear_shift
+from gyroid_cad.wall.closeness import Closeness
 from gyroid_cad.wall.covering import frame_of
 
 CELL, SHORTEST = 6.0, 0.02
@@ -35,7 +36,7 @@ def shortest_edge(shape: object) -> float:
 
 
 def filling_of(part: cq.Workplane) -> Filling:
-    regions, _, _, _, infill_in = described_infill("sheet", CELL, 0.6, None, FitSettings(5), None, None, USUAL)
+    regions, _, _, _, infill_in = described_infill("sheet", CELL, 0.6, None, Closeness(FitSettings(5)), None, USUAL)
     body = part_of(part)
     return Filling(body, None, regions, partial(infill_in, body), CELL, None)
 

@@ -36,8 +36,8 @@ from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
-from gyroid_cad.wall.closeness import Closeness, valid_tolerance
 from gyroid_cad.wall.covering import frame_of, placement
+from gyroid_cad.wall.fitted import Closeness, valid_tolerance
 
 __all__ = ["fill"]
 

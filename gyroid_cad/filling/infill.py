@@ -23,7 +23,6 @@ from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.lattice_faces import LatticeFaces
-from gyroid_cad.wall.closeness import Closeness
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.covering import (
     SIDE_SAMPLES,
@@ -36,7 +35,7 @@ from gyroid_cad.wall.covering import (
 )
 from gyroid_cad.wall.distances import in_wall
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
-from gyroid_cad.wall.fitted import LatticeSpec, fit_wall
+from gyroid_cad.wall.fitted import Closeness, LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall, side_along
 from gyroid_cad.wall.parameters import require_cell_size

@@ -21,11 +21,10 @@ from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.surface.families import MinimalSurface, TubeLaw, surface_named
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.wall.closeness import Closeness, valid_tolerance
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.covering import block_extent, placement
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import HOME, LatticeSpec
+from gyroid_cad.wall.fitted import HOME, Closeness, LatticeSpec, valid_tolerance
 from gyroid_cad.wall.grading import LARGEST_CELL, SMALLEST_CELL, THINNEST_WALL, Grading
 
 __all__ = [

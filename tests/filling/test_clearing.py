@@ -20,8 +20,8 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.clearance import NearMisses, clear_shift
-from gyroid_cad.wall.closeness import Closeness
 from gyroid_cad.wall.covering import frame_of
+from gyroid_cad.wall.fitted import Closeness
 
 CELL, SHORTEST = 6.0, 0.02
 

@@ -22,7 +22,7 @@ from gyroid_cad.trim.islands import SMALL_ISLAND
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.wall.areas import ShapeSize
 
-__all__ = ["Crossed", "FaceNames", "Made", "merged_chips"]
+__all__ = ["Crossed", "FaceNames", "Made", "made_of", "merged_chips"]
 
 Floats = NDArray[np.float64]
 # Solids by the name of what they are.
@@ -34,7 +34,7 @@ class Made:
     """A solid, or a shell of the bare surface, with its volume in mm3, its area in mm2, and its centroid in mm.
 
     There is no centroid where the kernel measured some of it, which is not as exact. Names of its faces, if it has any,
-    are in the order in which the kernel counts them.
+    are in the order in which the kernel counts them; wetted is what of its area is no mouth, in mm2.
     """
 
     shape: KernelShape
@@ -42,6 +42,7 @@ class Made:
     area: float
     centroid: Point | None = None
     face_names: tuple[str, ...] = ()
+    wetted: float = 0.0
 
     @property
     def size(self) -> ShapeSize:
@@ -119,8 +120,7 @@ class FaceNames:
 
     def made(self, solid: KernelShape, body: str, sizes: FaceSizes) -> Made:
         """A body with its size and the names of its faces."""
-        size = sizes.of(solid)
-        return Made(solid, size.volume, size.area, size.centroid, self.of(solid, body))
+        return made_of(solid, self.of(solid, body), sizes)
 
     def _name(self, number: int, body: str) -> str:
         if number < 0:
@@ -133,6 +133,21 @@ class FaceNames:
         if not self._hollow.opened[origin]:
             return f"{SKIN}/inside"
         return f"{body}/opening {sum(self._hollow.opened[: origin + 1])}"
+
+
+def made_of(solid: KernelShape, names: tuple[str, ...], sizes: FaceSizes) -> Made:
+    """A body whose faces have names, with its size.
+
+    Parameters
+    ----------
+    solid : TopoDS_Shape
+    names : tuple of str
+        Those of faces between bodies begin with the wall's name or the skin's.
+    sizes : FaceSizes
+    """
+    size, areas = sizes.of(solid), sizes.areas(solid)
+    wetted = [name.split("/")[0] in (WALL, SKIN) for name in names]
+    return Made(solid, size.volume, size.area, size.centroid, names, float(areas[wetted].sum()))
 
 
 def merged_chips(bodies: Bodies, volume_of: Callable[[KernelShape], float], one_cell: float) -> Bodies:

@@ -15,6 +15,7 @@ from gyroid_cad.common.choices import Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
+from gyroid_cad.filling.bodies import Made
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
@@ -22,7 +23,7 @@ from gyroid_cad.filling.forecast import require_cover
 from gyroid_cad.filling.infill import Foreseen, InfillIn, described_infill
 from gyroid_cad.filling.part import FilledBy, Filling, Outcome, bodies_of, part_of, without_specks
 from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, open_faces, require_of_bodies
-from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
+from gyroid_cad.filling.report import FillReport, FluidReport, fluid_report, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
@@ -318,7 +319,13 @@ def _reported(
         cells_alike=outcome.infill.grading.cells_alike,
         uncovered=outcome.infill.uncovered,
         volumes={name: sum(made.volume for made in some) for name, some in domains.items()},
+        fluids=tuple(_fluid(name, some) for name, some in domains.items() if name in fluids),
     )
     sizes = {name: tuple(made.size for made in some) for name, some in domains.items()}
     face_names = {name: tuple(called for made in some for called in made.face_names) for name, some in domains.items()}
     return Filled(shapes, report, sizes, face_names)
+
+
+def _fluid(name: str, made: Sequence[Made]) -> FluidReport:
+    volume, wetted = (sum(getattr(one, of) for one in made) for of in ("volume", "wetted"))
+    return fluid_report(name, volume, wetted, len(made))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.filling.bodies import Crossed, Made, merged_chips
+from gyroid_cad.filling.bodies import Crossed, Made, made_of, merged_chips
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.part import Filling, Outcome
 from gyroid_cad.filling.roads import crossed_by, patches_of
@@ -25,9 +25,11 @@ from gyroid_cad.filling.wanted import BODIES, FLUID_A, FLUID_B, SKIN, WALL, Regi
 from gyroid_cad.kernel.check import faces_of, is_valid, topology
 from gyroid_cad.kernel.compat import NumberedShapes, as_face
 from gyroid_cad.kernel.crossed import FaceSizes
+from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.shells import solids_of
 from gyroid_cad.kernel.skin import Hollow, opened_faces
+from gyroid_cad.kernel.skin_room import shown_place
 from gyroid_cad.kernel.solid import KernelFace, KernelShape
 from gyroid_cad.kernel.split import bounded_solids, inner_sides
 from gyroid_cad.trim.clearance import NearMisses
@@ -190,6 +192,7 @@ class PortedFilling:
             crossing, inside = patches_of(filling, infill)
             crossed = crossed_by(filling, infill, filling.regions[0], crossing, inside, outer=True)
             made[name] = _Fluid(name, filling, infill, crossed)
+            made[name].require_mouths()
             cut, whole = max(cut, len(crossing)), max(whole, len(inside))
         domains = self._bodies(made)
         with self._first.timed("check"):
@@ -232,9 +235,7 @@ class PortedFilling:
             domains[WALL] = [replace(walls[0], volume=left)]
 
     def _made(self, solid: KernelShape, sizes: FaceSizes, made: dict[str, _Fluid], body: str) -> Made:
-        size = sizes.of(solid)
-        names = tuple(_name_of(face, made, body) for face in faces_of(solid))
-        return Made(solid, size.volume, size.area, size.centroid, names)
+        return made_of(solid, tuple(_name_of(face, made, body) for face in faces_of(solid)), sizes)
 
     def _wall_faces(self, made: dict[str, _Fluid]) -> list[KernelFace]:
         """Faces of the wall with the skin: the part's own, what is left of openings, and those of both fluids."""
@@ -266,6 +267,22 @@ class _Fluid:
 
     def wanted_at(self, point: Floats) -> bool:
         return bool(self.infill.contains(self.filling.regions[0], point[np.newaxis])[0])
+
+    def require_mouths(self) -> None:
+        """Check that channels of the fluid come to all faces that are open for it.
+
+        Raises
+        ------
+        ParameterError
+        """
+        pieces = self.crossed.pieces
+        reached = {origin for origin, inner in zip(pieces.origins, self.inner, strict=True) if inner}
+        for origin, is_open in enumerate(self.hollow.opened):
+            if is_open and origin not in reached:
+                face = next(face for face, own in zip(pieces.boundary, pieces.origins, strict=True) if own == origin)
+                place = shown_place(corners_of(box_round([face])).mean(axis=0))
+                accepted = f"faces that the fluid's channels reach, not the one round {place}"
+                raise ParameterError("openings", f"{self.name[-1]}:", accepted)
 
     def opened_faces(self) -> list[KernelFace]:
         """Faces of the part that are open for this fluid."""

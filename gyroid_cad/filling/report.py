@@ -12,7 +12,7 @@ from gyroid_cad.common.tables import Rows, cell_shown, islands_shown, text_table
 from gyroid_cad.errors import PartWarning
 from gyroid_cad.trim.islands import SealedVoid, warn_caller
 
-__all__ = ["FillReport", "joint_report", "warn_of_uncovered"]
+__all__ = ["FillReport", "FluidReport", "fluid_report", "joint_report", "warn_of_uncovered"]
 
 # Of several bodies these add up.
 _SUMMED = (
@@ -29,6 +29,34 @@ _SUMMED = (
     "whole_patches",
 )
 _MASSES = ("mass", "part_mass")
+
+
+@dataclass(frozen=True, slots=True)
+class FluidReport:
+    """Report on one fluid of a part.
+
+    Attributes
+    ----------
+    name : str
+    volume, wetted_area : float
+        In mm3 and mm2; mouths are not wetted.
+    hydraulic_diameter : float
+        Four times the volume by the wetted area, in mm.
+    pieces : int
+        Not connected to each other.
+    """
+
+    name: str
+    volume: float
+    wetted_area: float
+    hydraulic_diameter: float
+    pieces: int
+
+    def __str__(self) -> str:
+        pieces = "" if self.pieces == 1 else f" in {self.pieces} pieces"
+        sizes = f"wetted {self.wetted_area:.6g} mm2, hydraulic diameter {self.hydraulic_diameter:.4g} mm"
+        return f"{self.volume:.8g} mm3{pieces}, {sizes}"
+
 
 # In the table; the report has all of them.
 _VOIDS_SHOWN = 3
@@ -86,6 +114,10 @@ class FillReport:
         At the latter ``faces`` counts triangles, and patches are not told apart by the part's boundary.
     deviation : float, optional
         Of triangles from the lattice and the part, in mm, at that route.
+    volumes : dict
+        In mm3, by the name of what there is.
+    fluids : tuple of FluidReport
+        Of bodies that share their faces.
 
     Examples
     --------
@@ -133,6 +165,7 @@ class FillReport:
     route: Route = "brep"
     deviation: float | None = None
     volumes: dict[str, float] = field(default_factory=dict)
+    fluids: tuple[FluidReport, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain values, ready for JSON."""
@@ -175,7 +208,8 @@ class FillReport:
     def _volumes_shown(self) -> Rows:
         """Volumes of what there is more than one of."""
         several = self.volumes if len(self.volumes) > 1 else {}
-        return [(name, f"{volume:.8g} mm3") for name, volume in several.items()]
+        shown = {fluid.name: str(fluid) for fluid in self.fluids}
+        return [(name, shown.get(name, f"{volume:.8g} mm3")) for name, volume in several.items()]
 
     def _voids_shown(self) -> str:
         shown = "; ".join(map(str, self.voids[:_VOIDS_SHOWN]))
@@ -189,6 +223,20 @@ def warn_of_uncovered(share: float) -> None:
     """Emit a :class:`~gyroid_cad.PartWarning` if some of a part is out of the lattice's reach."""
     if share:
         warn_caller(f"{100 * share:.3g} % of the part is out of the lattice's reach", PartWarning)
+
+
+def fluid_report(name: str, volume: float, wetted: float, pieces: int) -> FluidReport:
+    """Report on a fluid of so many mm3, that wets so many mm2.
+
+    >>> fluid_report("fluid-a", 30.0, 60.0, 1).hydraulic_diameter
+    2.0
+    """
+    return FluidReport(name, volume, wetted, 4 * volume / wetted if wetted else 0.0, pieces)
+
+
+def _joint_fluid(some: Sequence[FluidReport]) -> FluidReport:
+    volume, wetted = (sum(getattr(one, name) for one in some) for name in ("volume", "wetted_area"))
+    return fluid_report(some[0].name, volume, wetted, sum(one.pieces for one in some))
 
 
 def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:
@@ -223,6 +271,7 @@ def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> 
             name: sum(report.volumes.get(name, 0.0) for report in reports)
             for name in dict.fromkeys(name for report in reports for name in report.volumes)
         },
+        fluids=tuple(_joint_fluid(some) for some in zip(*(report.fluids for report in reports), strict=True)),
         bodies=len(reports),
         remarks=remarks,
     )

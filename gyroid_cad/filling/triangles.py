@@ -24,7 +24,7 @@ from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, SURFACE, Regi
 from gyroid_cad.mesh.triangles.booleans import Body, body_of, united
 from gyroid_cad.mesh.triangles.corners import indexed_triangles
 from gyroid_cad.mesh.triangles.stl import is_coarse, require_near_origin
-from gyroid_cad.mesh.triangles.storing import joined_meshes, without_chips, storable_triangles
+from gyroid_cad.mesh.triangles.storing import joined_meshes, storable_triangles, without_chips
 from gyroid_cad.mesh.triangles.triangulation import triangulated
 from gyroid_cad.mesh.triangles.writing import write_triangles
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, triangles_picture

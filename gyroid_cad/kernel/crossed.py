@@ -328,16 +328,24 @@ class FaceSizes:
         volume = area = 0.0
         moment, exact = np.zeros(3), True
         for face in parts_of(shape, TopAbs_FACE):
-            index = int(self._numbers.FindIndex(face)) - 1
-            if index >= 0:
-                sign = 1.0 if face.Orientation() == self._orientations[index] else -1.0
-                flux, size = sign * float(self._measures.flux[index]), float(self._measures.area[index])
-                moment += sign * self._measures.moment[index]
-            else:
-                flux, size = measure_about(as_face(face), self._middle)
-                exact = False
+            flux, size, own = self._of_face(face)
             volume, area = volume + flux, area + size
+            exact &= own is not None
+            moment += np.zeros(3) if own is None else own
         if not (exact and volume):
             return ShapeSize(volume, area)
         x, y, z = (self._middle + moment / volume).tolist()
         return ShapeSize(volume, area, (x, y, z))
+
+    def areas(self, shape: TopoDS_Shape) -> Floats:
+        """Areas of its faces, in the order in which the kernel counts them, in mm2."""
+        return np.array([self._of_face(face)[1] for face in parts_of(shape, TopAbs_FACE)])
+
+    def _of_face(self, face: TopoDS_Shape) -> tuple[float, float, Floats | None]:
+        """Flux and area of a face, and its moment, None if the kernel is asked."""
+        index = int(self._numbers.FindIndex(face)) - 1
+        if index < 0:
+            return *measure_about(as_face(face), self._middle), None
+        sign = 1.0 if face.Orientation() == self._orientations[index] else -1.0
+        measures = self._measures
+        return sign * float(measures.flux[index]), float(measures.area[index]), sign * measures.moment[index]

@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 import cadquery as cq
+import numpy as np
 import pytest
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 
@@ -14,7 +15,9 @@ from gyroid_cad.filling.fill import fill
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.kernel.assembly import read_bodies
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.wall.covering import frame_of, periodic_offsets
 
 CELL, FIT = 6.0, FitSettings(5)
 
@@ -104,6 +107,18 @@ def test_where_one_fluid_flows_in_the_channels_of_the_other_are_closed() -> None
         # The other way it ends at the skin.
         other = part.faces(("<Y", "<X")[axis]).val()
         assert other.distance(cq.Shape.cast(made.domains[name])) == pytest.approx(0.7, abs=1e-6)
+    # Chips have been joined to what is round them, and what the fluids wet is what the wall shows them.
+    assert {name: topology(shape).solids for name, shape in made.domains.items()} == dict.fromkeys(made.domains, 1)
+    for fluid in made.report.fluids:
+        kept = [
+            cq.Face(face).Area()
+            for face, called in zip(
+                parts_of(made.domains[fluid.name], TopAbs_FACE), made.face_names[fluid.name], strict=True
+            )
+            if not called.startswith(f"{fluid.name[-1]}:")
+        ]
+        assert fluid.wetted_area == pytest.approx(sum(kept), rel=1e-3)
+        assert fluid.hydraulic_diameter == pytest.approx(4 * fluid.volume / fluid.wetted_area)
     # By the kernel's own integrals, which know nothing of ours.
     wall = cq.Shape.cast(made.domains["wall"])
     assert wall.isValid()
@@ -123,3 +138,12 @@ def test_openings_for_fluids_are_refused_where_they_contradict(openings: list[st
         bodies_of(ball() if len(openings) == 1 else cq.Workplane().box(9, 8, 6), skin=0.7, openings=openings)
     with pytest.raises(ParameterError, match="unless kind is"):
         fill(ball(), CELL, density=0.3, skin=0.7, openings=["a:>X", "b:<X"])
+
+
+def test_an_opening_that_no_channel_of_its_fluid_reaches_is_refused() -> None:
+    # A stub that is narrower than a channel, with the middle of one of fluid b before it.
+    part = cq.Workplane().box(5, 4, 4).union(cq.Workplane().box(1.6, 1.6, 1.6).translate((0, 2, 0)))
+    mouth, origins = np.array([[0.0, 2.8, 0.0]]), [(x, 0.0, z) for x in range(6) for z in range(6)]
+    offsets = [periodic_offsets(frame_of(origin, (0, 0, 0)), CELL, mouth, USUAL)[0] for origin in origins]
+    with pytest.raises(ParameterError, match="channels reach"):
+        bodies_of(part, skin=0.5, openings=["a:>Y", "b:<Y"], origin=origins[int(np.argmin(offsets))])

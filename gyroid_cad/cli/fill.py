@@ -268,7 +268,7 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     require_given(given, "cell_size")
     if given["kind"] != "surface":
         require_one_wall(given)
-    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface")}
+    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface", "compact")}
     return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
 
 

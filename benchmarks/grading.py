@@ -31,9 +31,8 @@ from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.surface.patch import PARAMETERISATIONS
 from gyroid_cad.surface.symmetry import QUARTER
 from gyroid_cad.wall.complex import CellComplex
-from gyroid_cad.wall.fitted import LatticeSpec, fit_spec
+from gyroid_cad.wall.fitted import USUAL_TOLERANCE, LatticeSpec, fit_spec
 from gyroid_cad.wall.offset import SIDES, Wall
-from gyroid_cad.wall.parameters import USUAL_TOLERANCE
 from gyroid_cad.wall.refit import graded_wall
 
 __all__ = ["main"]

@@ -31,7 +31,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
@@ -70,6 +70,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         trim: Trim | None = None,
         surface: SurfaceName = "gyroid",
         keep_islands: bool = False,
+        compact: float | None = None,
     ) -> None:
         self.lattice = Lattice(
             cells,
@@ -83,6 +84,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
             trim,
             surface,
             keep_islands=keep_islands,
+            compact=compact,
         )
         # A solid where it is one, as the host's own objects begin: the place of a part would be lost in its ``locate``.
         part = Part.cast(self.lattice.solid())
@@ -104,7 +106,8 @@ class GyroidFill(Part):  # type: ignore[misc]
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
         In a builder, the filled part takes the place of what is there.
-    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface, solids, partial
+    origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface, solids, partial, \
+    compact
         As of :func:`gyroid_cad.fill`.
 
     Attributes
@@ -151,6 +154,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         surface: SurfaceName = "gyroid",
         solids: Sequence[str | int] = (),
         partial: bool = False,
+        compact: float | None = None,
     ) -> None:
         # As the host's operations do, not as its objects: those are placed at the builder's locations.
         context: BuildPart | None = BuildPart._get_context("GyroidFill")
@@ -177,6 +181,7 @@ class GyroidFill(Part):  # type: ignore[misc]
             keep_islands=keep_islands,
             solids=solids,
             partial=partial,
+            compact=compact,
         )
         self.report = filled.report
         self.mode = mode

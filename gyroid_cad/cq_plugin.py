@@ -46,12 +46,13 @@ def gyroid(
     trim: Trim | None = None,
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
+    compact: float | None = None,
 ) -> Plane:
     """A lattice of the gyroid, or of another surface, at each point of the stack.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -89,6 +90,7 @@ def gyroid(
         trim,
         surface,
         keep_islands=keep_islands,
+        compact=compact,
     )
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
@@ -120,6 +122,7 @@ def gyroid_fill(
     surface: SurfaceName = "gyroid",
     solids: Sequence[str | int] = (),
     partial: bool = False,
+    compact: float | None = None,
 ) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
@@ -129,7 +132,7 @@ def gyroid_fill(
     Parameters
     ----------
     cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
-    tolerance, lattice, surface, solids, partial
+    tolerance, lattice, surface, solids, partial, compact
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -174,6 +177,7 @@ def gyroid_fill(
         keep_islands=keep_islands,
         solids=solids,
         partial=partial,
+        compact=compact,
     )
     for name, domain in made.domains.items():
         self.newObject([cq.Shape.cast(domain)]).tag(name)

@@ -87,6 +87,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         Where the finished lattice is placed: it is turned about the axes x, y, z, one after the other, in degrees,
         about its own origin, which then stands at ``origin``, in mm; as :func:`~gyroid_cad.fill` has it. Fields and
         maps turn and move with it.
+    compact : float, optional
+        Largest deviation in mm instead of ``fit`` or ``tolerance``, met by the fewest control points, 5 or more a side.
 
     Raises
     ------
@@ -99,8 +101,6 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
     >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
     >>> print(f"{lattice.volume_fraction:.4f}")
     0.2452
-    >>> Lattice((3, 1, 1), 10, density="0.2 + 0.01*x").uniform
-    False
     """
 
     def wall(self) -> Wall:

@@ -198,6 +198,7 @@ CASES: dict[str, dict[str, Case]] = {
         "porosity": Case({"porosity": 0.7}, lambda made, usual: near(made.volume, 300), ("thickness",)),
         "surface": Case({"surface": "diamond"}, lambda made, usual: near(made.faces / usual.faces, 2, 0.5)),
         "tolerance": Case({"tolerance": 1e-4}, lambda made, usual: made.poles > usual.poles),
+        "compact": Case({"compact": 3e-3}, lambda made, usual: made.poles == 6, ("control points",)),
         "fit": Case({"fit": "paper"}, lambda made, usual: told(made, "4.36e-03"), ("control points",)),
         "control points": Case({"control points": 6}, lambda made, usual: (made.poles, usual.poles) == (6, 4)),
         "trim": Case({"trim": "box"}, lambda made, usual: near(made.between_corners, 10, 1e-6) and made.solids == 1),
@@ -247,6 +248,7 @@ CASES: dict[str, dict[str, Case]] = {
         "tolerance": Case(
             {"density": "0.2 + 0.005*x", "tolerance": 2e-5}, lambda made, usual: made.poles > 10, ("control points",)
         ),
+        "compact": Case({"compact": 3e-3}, lambda made, usual: made.poles == 6, ("control points",)),
         "fit": Case({"fit": "paper"}, lambda made, usual: told(made, "4.36e-03"), ("control points",)),
         "control points": Case({"control points": 6}, lambda made, usual: (made.poles, usual.poles) == (6, 4)),
         "keep islands": Case({"part": block_at(0, CELL), "keep islands": True}, lambda made, usual: made.solids == 3),

@@ -97,9 +97,11 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @click.option(
     "--kind",
     type=click.Choice(KINDS),
+    metavar="KIND",
     default="sheet",
     show_default=True,
-    help="The wall, one of the two networks it parts, both of them without the wall, or the mid-surface alone. "
+    help="sheet, the wall; network-a or network-b, one of the two that it parts; channels, both of them without it; "
+    "bodies, wall and both as solids that share their faces; surface, the mid-surface alone. "
     "Density is that of the wall, of channels too, but of a network its own.",
 )
 @click.option("--skin", type=float, metavar="MM", help="Keep a solid shell of the part, fused with the infill.")
@@ -266,7 +268,7 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
     require_given(given, "cell_size")
     if given["kind"] != "surface":
         require_one_wall(given)
-    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface")}
+    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface", "compact")}
     return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
 
 

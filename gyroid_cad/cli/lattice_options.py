@@ -154,6 +154,12 @@ _INFILL_OPTIONS = (
         help="Largest deviation in cell sizes; 1e-4 if left out where the lattice is graded.",
     ),
     click.option(
+        "--compact",
+        type=float,
+        metavar="MM",
+        help="Largest deviation in mm instead, met by as few control points as can be, from 5 a side: for small files.",
+    ),
+    click.option(
         "--control-points",
         type=int,
         default=10,
@@ -273,11 +279,11 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
                 f"{listed(mixed or own_options)}"
             )
         units = {name: given[name] for name in PAPER_OPTIONS if given[name] is not None}
-        common = {name: given[name] for name in ("tolerance", "surface")}
+        common = {name: given[name] for name in ("tolerance", "surface", "compact")}
         return Lattice.paper(given["cells"], **units, fit=fit, **common, **place)
     require_given(given, "cell_size")
     require_one_wall(given)
-    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface")}
+    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface", "compact")}
     return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, **cut, **place, fit=fit)
 
 
@@ -343,6 +349,8 @@ def fit_of(given: dict[str, Any]) -> FitSettings:
     from gyroid_cad.surface.fit import FitSettings
 
     control_points = given["control_points"]
+    if given["compact"] is not None and (own := listed(["control_points"])) in options_given(()):
+        raise click.UsageError(f"give {own} or {listed(['compact'])}, which chooses them itself, not both")
     if given["fit"] == "smooth":
         return FitSettings(control_points)
     settings = FitSettings.paper()

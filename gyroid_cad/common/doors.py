@@ -93,6 +93,7 @@ _WALL = (
     _row("porosity", **_COMPLEMENT),
     _row("surface"),
     _row("tolerance"),
+    _row("compact"),
     _row("fit"),
     _row("control points", **_FIT),
     _row("keep islands"),

@@ -38,7 +38,7 @@ from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
-from gyroid_cad.wall.parameters import valid_tolerance
+from gyroid_cad.wall.fitted import Closeness, valid_tolerance
 
 __all__ = ["fill"]
 
@@ -71,6 +71,7 @@ def fill(
     route: Route = "brep",
     deviation: float | None = None,
     repair: bool = False,
+    compact: float | None = None,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -135,6 +136,8 @@ def fill(
         Of the triangles of that route, in mm; of the other, :meth:`Filled.write` takes it.
     repair : bool
         Close a part of triangles that is open, at that route; the report says what was done.
+    compact : float, optional
+        Instead of ``tolerance`` or ``fit``, largest deviation in mm, met by as few control points as can be.
 
     Returns
     -------
@@ -161,12 +164,12 @@ def fill(
     shell = checked_skin(skin, openings, core, kind)
     require_of_bodies(kind, openings, drop_islands, route)
     rule = island_rule(keep_islands or kind == BODIES, drop_islands)
-    closeness = None if tolerance is None else valid_tolerance(tolerance)
+    closeness = Closeness(fit or FitSettings(), None if tolerance is None else valid_tolerance(tolerance), compact)
     chosen = surface_named(surface)
     require_route(route, deviation=deviation, repair=repair, fillet=fillet)
     radius = checked_fillet(fillet, shell, core)
     regions, size, settings, foreseen, infill_in = described_infill(
-        kind, cell_size, thickness, density, fit or FitSettings(), closeness, lattice, chosen, partial
+        kind, cell_size, thickness, density, closeness, lattice, chosen, partial
     )
     if route == TRIANGLES:
         cover = functools.partial(require_cover, cell_size=size, control_points=settings.control_points)

@@ -22,7 +22,6 @@ from gyroid_cad.kernel.solid import build_faces, build_patches
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.wall.complex import CellComplex
 from gyroid_cad.wall.covering import (
@@ -36,10 +35,10 @@ from gyroid_cad.wall.covering import (
 )
 from gyroid_cad.wall.distances import in_wall
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
-from gyroid_cad.wall.fitted import LatticeSpec, fit_wall
+from gyroid_cad.wall.fitted import Closeness, LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
 from gyroid_cad.wall.offset import Wall, side_along
-from gyroid_cad.wall.parameters import USUAL_TOLERANCE, require_cell_size
+from gyroid_cad.wall.parameters import require_cell_size
 from gyroid_cad.wall.self_intersection import require_simple
 
 __all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill"]
@@ -152,8 +151,7 @@ def described_infill(
     cell_size: float | None,
     thickness: FieldLike | None,
     density: FieldLike | None,
-    fit: FitSettings,
-    tolerance: float | None,
+    closeness: Closeness,
     lattice: Lattice | None,
     surface: MinimalSurface,
     partial: bool = False,
@@ -163,7 +161,8 @@ def described_infill(
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
     if lattice is not None:
-        given = {"cell_size": cell_size, "thickness": thickness, "density": density, "tolerance": tolerance}
+        given = {"cell_size": cell_size, "thickness": thickness, "density": density}
+        given |= {"tolerance": closeness.tolerance, "compact": closeness.compact}
         for name, value in given.items():
             if value is not None:
                 raise ParameterError(name, value, "none beside a lattice, which has its own")
@@ -174,18 +173,18 @@ def described_infill(
         def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
             return block_infill(lattice, part, frame, timed, partial)
 
-        uniform = lattice.wall_thickness if lattice.uniform else 0.0
+        uniform, settings = lattice.wall_thickness if lattice.uniform else 0.0, lattice.spec().settings
         own = lattice.cell_size, uniform, lattice.thickness, lattice.density
-        foreseen = partial_of(_foreseen, lattice.grading().cells_alike, lattice.fit.control_points, *own)
-        return regions.regions, lattice.cell_size, fit, foreseen, block
+        foreseen = partial_of(_foreseen, lattice.grading().cells_alike, settings.control_points, *own)
+        return regions.regions, lattice.cell_size, settings, foreseen, block
     size = finite_number("cell_size", cell_size, "a length in mm, a finite number")
     require_cell_size(size)
     wanted = regions_of(kind, size, thickness, density, surface.tube)
-    settings = fit if tolerance is None or not wanted.uniform else fit_within(fit, tolerance, surface.family)
-    closeness = tolerance or USUAL_TOLERANCE
+    closeness.require(size)
+    settings, tolerance = closeness.chosen(size, surface.family if wanted.uniform else None)
 
     def endless(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
-        made = endless_infill(part, frame, size, wanted.at_least(least), settings, closeness, timed, surface)
+        made = endless_infill(part, frame, size, wanted.at_least(least), settings, tolerance, timed, surface)
         require_thicker(part, made.max_thickness, thickness, density)
         return made
 

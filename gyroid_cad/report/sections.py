@@ -202,6 +202,7 @@ def parameters_section(subject: Subject) -> Values:
         },
         **({} if lattice.trim is None else {"trim": lattice.trim}),
         **({} if lattice.tolerance is None else {"tolerance": lattice.tolerance}),
+        **({} if lattice.compact is None else {"compact": lattice.compact}),
         "control_points": len(lattice.fitted().wall.weights),
     }
 

@@ -23,7 +23,7 @@ from gyroid_cad.surface.fit import (
 from gyroid_cad.surface.patch import PARAMETERISATIONS, parameter_corners
 from gyroid_cad.surface.weierstrass import GYROID, Family
 
-__all__ = ["FitReport", "error_within_reach", "fit_report", "fit_within", "more_control_points"]
+__all__ = ["FitReport", "error_within_reach", "fewest_within", "fit_report", "fit_within", "more_control_points"]
 
 _REPORT_SAMPLES_PER_SPAN = 8
 _MOST_REPORT_SAMPLES = 121
@@ -128,6 +128,33 @@ def fit_within(settings: FitSettings, tolerance: float, family: Family = GYROID)
             raise ParameterError("tolerance", tolerance, f"at least {reached:.2g}, which {n} control points reach")
         settings = replace(settings, control_points=more_control_points(n, reached / tolerance))
     return settings
+
+
+def fewest_within(settings: FitSettings, tolerance: float, family: Family = GYROID) -> FitSettings:
+    """Raise the control points of settings no further than a tolerance takes.
+
+    :func:`fit_within` goes up by leaps, to be there soon, and may land a little past the fewest that do.
+
+    Parameters
+    ----------
+    settings : FitSettings
+        With the fewest control points to be had.
+    tolerance : float
+        Largest deviation of the mid-surface, in cell sizes.
+    family : Family
+
+    Raises
+    ------
+    ParameterError
+        If it is out of reach.
+    """
+    found = fit_within(settings, tolerance, family)
+    while found.control_points > settings.control_points:
+        fewer = replace(found, control_points=found.control_points - 1)
+        if fit_report(fit_patch(fewer, family)).max_distance > tolerance:
+            break
+        found = fewer
+    return found
 
 
 def error_within_reach(control_points: int, error: float) -> float:

@@ -178,9 +178,7 @@ def wall_faces(wall: Wall, period: float | None) -> WallFaces:
     normals *= (np.where(side == 1, 1.0, -1.0) / np.linalg.norm(normals, axis=1))[:, np.newaxis]
     points = points.reshape(-1, 3)
     if period is not None:
-        points = np.mod(points, period)
-        # Rounding may leave a small negative number at the period itself.
-        points[points >= period] = 0.0
+        points = within_period(points, period)
     derivatives = values[1:].reshape(5, -1, 3)
     return WallFaces(points, derivatives, normals, side, 2 / steps, period, tree_of(points, period))
 
@@ -189,7 +187,20 @@ def tree_of(points: Floats, period: float | None = None) -> Any:
     """A tree in which to look up points (``scipy.spatial.cKDTree``), which repeat if there is a period."""
     from scipy.spatial import cKDTree
 
-    return cKDTree(points, boxsize=period)  # type: ignore[arg-type]
+    if period is None:
+        return cKDTree(points)
+    return cKDTree(within_period(points, period), boxsize=period)
+
+
+def within_period(points: Floats, period: float) -> Floats:
+    """Images of points in the period that begins at zero.
+
+    >>> within_period(np.array([-1.0, -1e-20, 10.0, 12.0]), 10.0)
+    array([9., 0., 0., 2.])
+    """
+    points = np.mod(points, period)
+    # Rounding leaves a small negative number at the period itself.
+    return np.where(points >= period, 0.0, points)
 
 
 def nearest_offsets(places: Floats, normals: Floats, points: Floats) -> tuple[Floats, Integers]:

@@ -21,15 +21,13 @@ from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
 from gyroid_cad.surface.families import MinimalSurface, TubeLaw, surface_named
 from gyroid_cad.surface.fit import FitSettings
-from gyroid_cad.surface.fit_report import fit_within
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.covering import block_extent, placement
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import HOME, LatticeSpec
+from gyroid_cad.wall.fitted import HOME, Closeness, LatticeSpec, valid_tolerance
 from gyroid_cad.wall.grading import LARGEST_CELL, SMALLEST_CELL, THINNEST_WALL, Grading
 
 __all__ = [
-    "USUAL_TOLERANCE",
     "LatticeParameters",
     "MapLike",
     "percent_hint",
@@ -37,7 +35,6 @@ __all__ = [
     "require_density",
     "require_one",
     "require_thickness",
-    "valid_tolerance",
     "whole_cells",
 ]
 
@@ -113,21 +110,6 @@ def require_one(thickness: object, density: object) -> None:
         raise ParameterError("thickness, density", given, "exactly one of the two")
 
 
-def valid_tolerance(tolerance: float) -> float:
-    """The largest deviation of a fit, in cell sizes.
-
-    Raises
-    ------
-    ParameterError
-        If it is not above 0 and below 1.
-    """
-    accepted = "a part of the cell size, a finite number above 0 and below 1"
-    number = finite_number("tolerance", tolerance, accepted)
-    if not 0 < number < 1:
-        raise ParameterError("tolerance", tolerance, accepted)
-    return number
-
-
 def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:
     """Numbers of cells along x, y, z.
 
@@ -148,8 +130,6 @@ def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:
 
 MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
-# Of a graded lattice, in cell sizes.
-USUAL_TOLERANCE = 1e-4
 _FIELDS = {
     "thickness": "a length in mm",
     "density": "a volume fraction",
@@ -174,6 +154,7 @@ class LatticeParameters:
     keep_islands: bool = False
     origin: Point = HOME
     rotation: Point = HOME
+    compact: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -211,6 +192,7 @@ class LatticeParameters:
         surface: SurfaceName = "gyroid",
         origin: Point = HOME,
         rotation: Point = HOME,
+        compact: float | None = None,
     ) -> Self:
         """A lattice in the paper's own units (sec. 3.2): lengths in BC units, with one scale to millimetres.
 
@@ -224,7 +206,7 @@ class LatticeParameters:
             In BC units: a place p is moved to bc_length(p) p.
         scale : float
             Millimetres per unit of BC length.
-        fit, tolerance, surface, origin, rotation
+        fit, tolerance, surface, origin, rotation, compact
             As of :class:`Lattice`.
 
         Raises
@@ -248,6 +230,7 @@ class LatticeParameters:
             surface=surface,
             origin=origin,
             rotation=rotation,
+            compact=compact,
         )
 
     @property
@@ -324,10 +307,8 @@ class LatticeParameters:
         >>> Lattice((1, 1, 1), 10, thickness=0.8, tolerance=1e-6).spec().settings.control_points
         14
         """
-        settings = self.fit
-        if self.uniform and self.tolerance is not None:
-            settings = fit_within(settings, self.tolerance, self.minimal_surface.family)
-        tolerance = self.tolerance or USUAL_TOLERANCE
+        family = self.minimal_surface.family if self.uniform else None
+        settings, tolerance = Closeness(self.fit, self.tolerance, self.compact).chosen(self.cell_size, family)
         trimmed = self.trim is not None
         return LatticeSpec(
             self.cells, self.grading(), settings, tolerance, trimmed, self.keep_islands, self.origin, self.rotation
@@ -388,6 +369,7 @@ class LatticeParameters:
             )
         if self.tolerance is not None:
             object.__setattr__(self, "tolerance", valid_tolerance(self.tolerance))
+        Closeness(self.fit, self.tolerance, self.compact).require(self.cell_size)
 
 
 @lru_cache(maxsize=16)

@@ -21,6 +21,7 @@ from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.clearance import NearMisses, clear_shift
 from gyroid_cad.wall.covering import frame_of
+from gyroid_cad.wall.fitted import Closeness
 
 CELL, SHORTEST = 6.0, 0.02
 
@@ -35,7 +36,7 @@ def shortest_edge(shape: object) -> float:
 
 
 def filling_of(part: cq.Workplane) -> Filling:
-    regions, _, _, _, infill_in = described_infill("sheet", CELL, 0.6, None, FitSettings(5), None, None, USUAL)
+    regions, _, _, _, infill_in = described_infill("sheet", CELL, 0.6, None, Closeness(FitSettings(5)), None, USUAL)
     body = part_of(part)
     return Filling(body, None, regions, partial(infill_in, body), CELL, None)
 

@@ -31,7 +31,7 @@ from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops, Uses
-from gyroid_cad.trim.sections import section_knots
+from gyroid_cad.trim.section_splines import section_knots
 from gyroid_cad.wall.areas import ShapeSize
 from gyroid_cad.wall.offset import SIDES, Wall
 

@@ -17,18 +17,17 @@ from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Pnt
 from OCP.GProp import GProp_GProps
-from OCP.ShapeFix import ShapeFix_Shape
-from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideClosed
 from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.common.checks import three_numbers
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.kernel.check import is_valid, measure, parts_of
+from gyroid_cad.kernel.check import measure, parts_of
 from gyroid_cad.kernel.compat import as_face, as_solid
 from gyroid_cad.kernel.extent import bounding_box, box_of, free_form_faces
 from gyroid_cad.kernel.repair import fault_of
+from gyroid_cad.kernel.seams import without_seams
 from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
@@ -249,27 +248,9 @@ def sound_part(shape: TopoDS_Shape) -> Part:
     """A part of solids that are known to be sound, and to have no space in common."""
     low, high = bounding_box(shape)
     volume, area = measure(shape, _CLOSENESS)
-    divided = _without_seams(shape)
+    divided = without_seams(shape)
     solids = tuple(as_solid(solid) for solid in parts_of(divided, TopAbs_SOLID))
     return Part(divided, solids, low, high, volume, box_of(solids), area)
-
-
-def _without_seams(shape: TopoDS_Shape) -> TopoDS_Shape:
-    """The shape with spheres, cylinders and the like in two halves (``ShapeUpgrade_ShapeDivideClosed``).
-
-    A face that closes on itself and is then cut loses its sense in STEP files: the kernel's reader gives another face.
-    """
-    divide = ShapeUpgrade_ShapeDivideClosed(shape)
-    divide.Perform()
-    divided = divide.Result()
-    if divided is None or divided.IsNull() or divided.IsSame(shape):
-        return shape
-    if is_valid(divided):
-        return divided
-    # New edges may be left with curves that do not run alike.
-    fix = ShapeFix_Shape(divided)
-    fix.Perform()
-    return fix.Shape() if is_valid(fix.Shape()) else shape
 
 
 def _corners_of(face: TopoDS_Face) -> Floats:

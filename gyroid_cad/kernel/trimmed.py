@@ -20,7 +20,8 @@ from gyroid_cad.nurbs.surface import NurbsCurve
 from gyroid_cad.trim.box import BoxEdge, BoxFace, TrimmedWall
 from gyroid_cad.trim.caps import Cap, plane_axes
 from gyroid_cad.trim.edge_crossings import PLANES
-from gyroid_cad.trim.sections import Sections, section_knots
+from gyroid_cad.trim.section_splines import section_knots
+from gyroid_cad.trim.sections import Sections
 
 __all__ = ["build_trimmed", "hollowed_by"]
 

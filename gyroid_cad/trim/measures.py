@@ -18,7 +18,7 @@ from gyroid_cad.trim.free_surfaces import FreeForm, Swept
 from gyroid_cad.trim.lattice_faces import LatticeFaces
 from gyroid_cad.trim.pieces import Crossing, CutEdge, CutLoops
 from gyroid_cad.trim.section_fit import SectionCurve
-from gyroid_cad.trim.sections import on_section
+from gyroid_cad.trim.section_splines import on_section
 from gyroid_cad.trim.surfaces import PartSurface, Quadric
 
 __all__ = ["PieceMeasures", "boundary_measures", "joined", "lattice_measures", "whole_measures"]

@@ -12,31 +12,32 @@ from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.trim.lattice_faces import Pairs
 from gyroid_cad.trim.paths import Paths
-from gyroid_cad.trim.sections import chord_lengths, level_step, on_section, section_knots, spread_along
+from gyroid_cad.trim.section_splines import (
+    BETWEEN,
+    NEAR_ENOUGH,
+    chord_lengths,
+    close_enough,
+    more_stations,
+    on_section,
+    section_knots,
+    spread_along,
+    through_stations,
+)
+from gyroid_cad.trim.sections import level_step
 
 __all__ = ["SectionCurve", "fitted_sections"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough. Short
-# curves, by their length in the square, are tried with the fewest: receivers take close knots for tiny segments.
-_STATIONS, _USUAL, _SHORT = (3, 4, 6, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64, 96, 128), 8, 0.2
-_CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
-# With what power of their number the distance falls.
-_ORDER = 4
+# Short curves, by their length in the square, are tried with the fewest stations: receivers take close knots for tiny
+# segments.
+_FEWEST, _USUAL, _SHORT = 3, 8, 0.2
 # Steps of Newton's method.
 _NEWTON_STEPS = 12
 # How short the last is in the square, and in parts of the ranges of the part's parameters, where its square is what is
 # left: of stations to fit, and of those by which they are spread.
 _CLOSELY, _ROUGHLY = (1e-11, 1e-6), (1e-4, 1e-2)
-# So many functions on either side of its own do not vanish at a station that is nearly in its even place.
-_BAND = 4
-# In steps between stations.
-_UNEVEN = 0.75
-# Where the distance is measured, in steps beyond each station: where a face's curvature leaps, at a knot of its
-# maker's, it is not largest halfway.
-_BETWEEN = np.array([0.25, 0.5, 0.75])
 # How far from its stations a curve in the square may swing between them, in the length of all.
 _WIDEST = 1.2
 _AT_ONCE = 256
@@ -54,7 +55,7 @@ class SectionCurve:
     start, end : int
         Nodes; -1 if it closes.
     in_square, in_space, on_part : ndarray, shape (m, 2), (m, 3), (m, 2)
-        Control points on the knots of :func:`~gyroid_cad.trim.sections.section_knots`.
+        Control points on the knots of :func:`~gyroid_cad.trim.section_splines.section_knots`.
     deviation : float
         Of the three from each other, in mm.
     """
@@ -108,7 +109,7 @@ def fitted_sections(
     points: list[Floats] = []
     for parting in range(_PARTINGS + 1):
         control, deviation = _closely(pairs, paths, cell_size)
-        far = ~(deviation <= _NEAR_ENOUGH * cell_size)
+        far = ~(deviation <= NEAR_ENOUGH * cell_size)
         if np.any(far) and parting == _PARTINGS:
             worst = float(deviation.max())
             raise KernelError(f"a curve where the lattice crosses the part was fitted to {worst:.2g} mm only")
@@ -128,7 +129,7 @@ def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats]
     control: list[Floats] = [np.zeros((0, 7))] * len(paths.pair)
     deviation = np.full(len(paths.pair), np.inf)
     lengths = [np.linalg.norm(np.diff(places, axis=0), axis=1).sum() for places in paths.places]
-    counts = np.where(np.array(lengths) < _SHORT, _STATIONS[0], _USUAL)
+    counts = np.where(np.array(lengths) < _SHORT, _FEWEST, _USUAL)
     while np.any(counts):
         for count, left in grouped(counts):
             if not count:
@@ -137,17 +138,8 @@ def _closely(pairs: Pairs, paths: Paths, cell_size: float) -> tuple[list[Floats]
                 made, deviation[some] = _fitted(pairs, paths, some, count)
                 for index, path in enumerate(some.tolist()):
                     control[path] = made[index]
-        counts = _more_stations(counts, deviation / (_CLOSE * cell_size))
+        counts = more_stations(counts, deviation / close_enough(cell_size))
     return control, deviation
-
-
-def _more_stations(counts: Integers, excess: Floats) -> Integers:
-    """Numbers of stations that are likely to be enough; 0 where those there are cannot be improved on."""
-    order, most = np.array(_STATIONS), len(_STATIONS) - 1
-    likely = counts * np.where(np.isfinite(excess), excess, 1.0) ** (1 / _ORDER)
-    following = np.maximum(np.searchsorted(order, likely), np.searchsorted(order, counts, side="right"))
-    done = (excess <= 1) | (counts == order[-1]) | (counts == 0)
-    return np.where(done, 0, order[np.minimum(following, most)])
 
 
 def _parted(pairs: Pairs, paths: Paths, which: Integers, first: int) -> tuple[Paths, list[Floats]]:
@@ -181,15 +173,9 @@ def _fitted(pairs: Pairs, paths: Paths, which: Integers, count: int) -> tuple[Fl
     points, stations = _onto_curve(pairs, pair, stations, ends, _ROUGHLY)
     stations = spread_along(stations, chord_lengths(points), even)
     points, stations = _onto_curve(pairs, pair, stations, ends)
-    t = chord_lengths(points)
-    through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(which), count + 1, count + 1)
-    # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney):
-    # nearly even ones do.
-    crowded = ~np.all(np.isfinite(t), axis=1)
-    crowded |= np.abs(t - even).max(axis=1) * count > _UNEVEN
-    through[crowded] = np.eye(count + 1)
-    control = _solved(through, np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1))
-    looked_at = (even[:-1, None] + even[1] * _BETWEEN).ravel()
+    values = np.concatenate([stations[..., :2], points, stations[..., 2:]], axis=-1)
+    control, crowded = through_stations(points, values)
+    looked_at = (even[:-1, None] + even[1] * BETWEEN).ravel()
     between = basis(section_knots(count + 1), 3, looked_at) @ control
     astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
     u, v = np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1)
@@ -225,22 +211,3 @@ def _onto_curve(
         if not len(left):
             break
     return points, stations
-
-
-def _solved(through: Floats, values: Floats) -> Floats:
-    """Solutions of many systems at once, by elimination in the band that a spline's functions leave.
-
-    Without pivots, for a matrix of B-splines is totally positive (de Boor and Pinkus).
-    """
-    through, values = through.copy(), values.copy()
-    count = through.shape[1]
-    for k in range(count - 1):
-        rows, columns = slice(k + 1, k + 1 + _BAND), slice(k, k + 1 + 2 * _BAND)
-        factor = through[:, rows, k] / through[:, [k], k]
-        through[:, rows, columns] -= factor[..., None] * through[:, [k], columns]
-        values[:, rows] -= factor[..., None] * values[:, [k]]
-    for k in range(count - 1, -1, -1):
-        above = slice(k + 1, k + 1 + 2 * _BAND)
-        values[:, k] -= np.einsum("mj,mjc->mc", through[:, k, above], values[:, above])
-        values[:, k] /= through[:, k, k, None]
-    return values

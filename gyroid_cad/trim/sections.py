@@ -8,19 +8,29 @@ curve in the square and one for that in space, with the same parameter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import grouped
 from gyroid_cad.errors import KernelError
 from gyroid_cad.nurbs.basis import basis
 from gyroid_cad.nurbs.surface import grid_points
 from gyroid_cad.trim.edge_crossings import AXES, EdgeCrossings, FacesToCut, plane_heights
+from gyroid_cad.trim.section_splines import (
+    BETWEEN,
+    NEAR_ENOUGH,
+    chord_lengths,
+    close_enough,
+    more_stations,
+    on_section,
+    section_knots,
+    spread_along,
+    through_stations,
+)
 
-__all__ = ["Sections", "chord_lengths", "level_step", "on_section", "plane_sections", "section_knots", "spread_along"]
+__all__ = ["Sections", "level_step", "plane_sections"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,12 +40,9 @@ _STEPS = (0.1, 0.025)
 _LONGEST = 8.0
 # Samples along each side, to see that no curve closes within the square.
 _GRID = 33
-# Cubic splines through so many stations; the fewest that are close, in cell sizes, or the most if near enough.
-_STATIONS = (16, 32, 64, 128)
-_CLOSE, _NEAR_ENOUGH = 1e-7, 2e-6
+# Of stations, at first.
+_FIRST = 16
 _NEWTON_STEPS = 8
-# Of what is solved for a spline; stations evenly spread give 4.
-_WORST_CONDITION = 1e3
 # A curve in the square that swings out so far is no fit.
 _WIDEST = 1.1
 # Of Newton's method in the square: near a saddle it would leap out of where the face is defined.
@@ -77,24 +84,6 @@ class Sections:
     def in_space(self, curve: int, t: Floats, derivative: int = 0) -> Floats:
         """Points in mm, or their rate of change; shape (q, 3)."""
         return on_section(self.points[curve], t, derivative)
-
-
-@lru_cache
-def section_knots(control_points: int) -> Floats:
-    """Knots on [0, 1] of a cubic through as many evenly spaced stations, none at the second and last but one."""
-    inner = np.linspace(0, 1, control_points)[2:-2]
-    return np.concatenate([np.zeros(4), inner, np.ones(4)])
-
-
-def on_section(control: Floats, t: Floats, derivative: int = 0) -> Floats:
-    """Points of a curve through stations, or its rate of change, at parameters in [0, 1], from its control points."""
-    return np.asarray(_section_basis(len(control), np.asarray(t, float).tobytes(), derivative) @ control)
-
-
-@lru_cache(maxsize=256)
-def _section_basis(control_points: int, t: bytes, derivative: int) -> Floats:
-    """Most curves are looked at in the same places: at evenly spread ones, or at Gauss points from end to end."""
-    return basis(section_knots(control_points), 3, np.frombuffer(t), derivative)
 
 
 def plane_sections(faces: FacesToCut, crossings: EdgeCrossings, size: float) -> Sections:
@@ -214,17 +203,18 @@ def _fitted_closely(
     face, plane = crossings.face[starts], crossings.plane[starts]
     none = np.zeros((0, 3))
     found = Sections(face, plane, starts, ends, [none] * len(face), [none] * len(face), np.full(len(face), np.inf))
-    left = np.arange(len(face))
-    for count in _STATIONS:
-        if not len(left):
-            break
-        parameters, points, deviation = _fitted(faces, face[left], plane[left], [ways[k] for k in left.tolist()], count)
-        for index, curve in enumerate(left.tolist()):
-            found.parameters[curve], found.points[curve] = parameters[index], points[index]
-        found.deviation[left] = deviation
-        left = left[deviation > _CLOSE * size]
+    counts = np.full(len(face), _FIRST)
+    while np.any(counts):
+        for count, some in grouped(counts):
+            if not count:
+                continue
+            made = _fitted(faces, face[some], plane[some], [ways[k] for k in some.tolist()], count)
+            for curve, parameters, points in zip(some.tolist(), *made[:2], strict=True):
+                found.parameters[curve], found.points[curve] = parameters, points
+            found.deviation[some] = made[2]
+        counts = more_stations(counts, found.deviation / close_enough(size))
     worst = found.deviation.max(initial=0.0)
-    if not worst <= _NEAR_ENOUGH * size:
+    if not worst <= NEAR_ENOUGH * size:
         raise KernelError(f"a curve where the lattice crosses the box was fitted to {worst:.2g} mm only")
     return found
 
@@ -241,15 +231,9 @@ def _fitted(
     stations[:, [0, -1]] = [[way[0], way[-1]] for way in ways]
     points = _onto_level(faces, face, plane, stations)
     # Parameters by chord length: nearly even, and smooth however the stations are not quite so.
-    t = chord_lengths(points)
-    through = basis(section_knots(count + 1), 3, t.ravel()).reshape(len(face), count + 1, count + 1)
-    # A spline goes through stations only where each lies well within a function of its own (Schoenberg and Whitney).
-    crowded = ~np.all(np.isfinite(t), axis=1)
-    through[crowded] = np.eye(count + 1)
-    crowded |= np.linalg.cond(through) > _WORST_CONDITION
-    through[crowded] = np.eye(count + 1)
-    control = np.linalg.solve(through, np.concatenate([stations, points], axis=-1))
-    between = basis(section_knots(count + 1), 3, (even[1:] + even[:-1]) / 2) @ control
+    control, crowded = through_stations(points, np.concatenate([stations, points], axis=-1))
+    looked_at = (even[:-1, None] + even[1] * BETWEEN).ravel()
+    between = basis(section_knots(count + 1), 3, looked_at) @ control
     astray = np.any(np.abs(between[..., :2]) > _WIDEST, axis=(1, 2))
     exact = faces.points(face, *np.clip(between[..., :2], -_WIDEST, _WIDEST).transpose(2, 0, 1))
     deviation = np.linalg.norm(exact - between[..., 2:], axis=-1).max(axis=1)
@@ -266,18 +250,3 @@ def _onto_level(faces: FacesToCut, face: Integers, plane: Integers, stations: Fl
     points = faces.points(face, stations[..., 0], stations[..., 1])
     points[np.arange(len(face)), :, AXES[plane]] = faces.levels[face, plane][:, np.newaxis]
     return points
-
-
-def chord_lengths(points: Floats) -> Floats:
-    """Length of the chords up to each of points (..., k, d), in parts of all; not numbers if there is none."""
-    run = np.cumsum(np.linalg.norm(np.diff(points, axis=-2, prepend=points[..., :1, :]), axis=-1), axis=-1)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(run / run[..., -1:])
-
-
-def spread_along(ways: Sequence[Floats] | Floats, runs: Sequence[Floats] | Floats, t: Floats) -> Floats:
-    """Places of each way (k, d) at parameters t, where its own points have parameters ``runs``; shape (ways, q, d)."""
-    # All in one row, each beyond the one before it.
-    known = np.concatenate([np.nan_to_num(run) + 2.0 * number for number, run in enumerate(runs)])
-    asked = t + 2.0 * np.arange(len(ways))[:, np.newaxis]
-    return np.stack([np.interp(asked, known, column) for column in np.concatenate(ways).T], axis=-1)

@@ -28,7 +28,7 @@ from gyroid_cad.filling.report import FillReport
 from gyroid_cad.kernel.check import is_valid, measure, topology
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.pieces import Crossing
-from gyroid_cad.trim.sections import on_section
+from gyroid_cad.trim.section_splines import on_section
 
 COARSE = FitSettings(5)
 

@@ -12,7 +12,8 @@ from scipy.interpolate import BSpline
 
 from gyroid_cad.errors import KernelError
 from gyroid_cad.trim.edge_crossings import FacesToCut, edge_crossings, plane_heights
-from gyroid_cad.trim.sections import Sections, plane_sections, section_knots
+from gyroid_cad.trim.section_splines import section_knots
+from gyroid_cad.trim.sections import Sections, plane_sections
 
 Floats = NDArray[np.float64]
 

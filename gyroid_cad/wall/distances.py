@@ -189,7 +189,7 @@ def tree_of(points: Floats, period: float | None = None) -> Any:
 
     if period is None:
         return cKDTree(points)
-    return cKDTree(within_period(points, period), boxsize=period)
+    return cKDTree(within_period(points, period), boxsize=period)  # type: ignore[call-overload]
 
 
 def within_period(points: Floats, period: float) -> Floats:

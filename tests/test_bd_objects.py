@@ -143,8 +143,9 @@ def test_each_mode_leaves_the_volume_that_set_theory_says(mode: bd.Mode, volume:
 def test_algebra_gives_what_the_builder_gives(volume: float, common_volume: float) -> None:
     box = CHIP_SIDE**3
     fused, drilled = Gyroid(**GYROID) + chip(), Gyroid(**GYROID) - chip()
-    assert fused.volume == pytest.approx(volume + box - common_volume, abs=1e-4 * box)
-    assert drilled.volume == pytest.approx(volume - common_volume, abs=1e-4 * box)
+    # The host's own integrals are some 6e-5 off on whole patches, and less on those that were cut.
+    assert fused.volume == pytest.approx(volume + box - common_volume, rel=5e-5)
+    assert drilled.volume == pytest.approx(volume - common_volume, rel=5e-5)
     assert fused.is_valid
     assert drilled.is_valid
 

@@ -313,7 +313,7 @@ def test_files_are_written_and_read_back(tmp_path: Path) -> None:
         ({"skin": 0.4, "openings": ["up"]}, "openings = 'up'"),
         ({"skin": 0.4, "openings": [(50, 0, 0)]}, "a point on a face; the nearest is"),
         ({"tolerance": 2}, "tolerance = 2"),
-        ({"tolerance": 1e-12}, "at least about 5.5e-09, which 40 control points reach"),
+        ({"tolerance": 1e-12}, "at least about 5.8e-09, which 40 control points reach"),
         (
             {"lattice": Lattice((1, 1, 1), 10, 1), "cell_size": None, "thickness": None, "tolerance": 1e-3},
             "tolerance = 0.001: expected none beside a lattice",
@@ -344,7 +344,7 @@ def test_a_tolerance_is_heeded_of_a_uniform_wall_too() -> None:
     box = cq.Workplane().box(6, 6, 6)
     coarse, fine = (fill(box, CELL, WALL, fit=FitSettings(5), tolerance=part) for part in (0.5, 1e-5))
     exact = fill(box, CELL, WALL, fit=FitSettings(14)).report.volume
-    assert abs(fine.report.volume / exact - 1) < 1e-5 < abs(coarse.report.volume / exact - 1)
+    assert abs(fine.report.volume / exact - 1) < 3e-6 < abs(coarse.report.volume / exact - 1)
     with pytest.raises(ParameterError, match=r"^tolerance = 1e-12: expected at least"):
         fill(box, CELL, WALL, tolerance=1e-12)
 

@@ -157,6 +157,10 @@ class Filling:
         return read_boundary(self.core.shape)
 
     @cached_property
+    def _sides(self) -> dict[int, Integers]:
+        return {}
+
+    @cached_property
     def _extent(self) -> PartExtent:
         return PartExtent(self.core, self.cell_size)
 
@@ -223,7 +227,10 @@ class Filling:
 
     def sides(self, infill: Infill) -> Integers:
         """Side of the part on which each patch lies, or that it may be crossed."""
-        return infill.sides(self._extent.clearance, self.core.contains)
+        # Infills are kept, so that none gets the number of another.
+        if id(infill) not in self._sides:
+            self._sides[id(infill)] = infill.sides(self._extent.clearance, self.core.contains)
+        return self._sides[id(infill)]
 
     def _attempt(self, number: int, *given: Any) -> Outcome:
         """Fill, and announce it where it fails: another attempt takes as long again."""

@@ -31,7 +31,7 @@ from gyroid_cad.kernel.shells import solids_of
 from gyroid_cad.kernel.skin import Hollow, opened_faces
 from gyroid_cad.kernel.skin_room import shown_place
 from gyroid_cad.kernel.solid import KernelFace, KernelShape
-from gyroid_cad.kernel.split import bounded_solids, inner_sides
+from gyroid_cad.kernel.split import inner_sides
 from gyroid_cad.trim.clearance import NearMisses
 from gyroid_cad.trim.measures import joined
 from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
@@ -215,8 +215,7 @@ class PortedFilling:
         with self._first.timed("join"):
             found: dict[str, list[KernelShape]] = {WALL: list(solids_of(self._wall_faces(made), volume_of))}
             for name, fluid in made.items():
-                pieces, faces = fluid.crossed.pieces, fluid.crossed.faces
-                found[name] = list(bounded_solids(pieces, faces, fluid.wanted_at, volume_of))
+                found[name] = list(solids_of(fluid.own_faces(), volume_of))
             found = merged_chips(found, volume_of, self.cell_size**3)
             if not all(found.values()):
                 raise KernelError("nothing of a fluid lies in the part")
@@ -240,12 +239,11 @@ class PortedFilling:
     def _wall_faces(self, made: dict[str, _Fluid]) -> list[KernelFace]:
         """Faces of the wall with the skin: the part's own, what is left of openings, and those of both fluids."""
         faces: list[KernelFace] = []
-        opened = {name: fluid.opened_faces() for name, fluid in made.items()}
         for name, fluid in made.items():
-            own, rims = fluid.outer_faces(opened[name])
+            own, rims = fluid.outer_faces()
             faces += rims
             if name == FLUID_A:
-                others = [face for other, some in opened.items() if other != name for face in some]
+                others = made[FLUID_B].filling.opened
                 faces += [face for original, face in own if not any(original.IsSame(other) for other in others)]
             faces += fluid.turned_faces()
         return faces
@@ -284,14 +282,16 @@ class _Fluid:
                 accepted = f"faces that the fluid's channels reach, not the one round {place}"
                 raise ParameterError("openings", f"{self.name[-1]}:", accepted)
 
-    def opened_faces(self) -> list[KernelFace]:
-        """Faces of the part that are open for this fluid."""
-        return list(self.filling.opened)
+    def own_faces(self) -> list[KernelFace]:
+        """Faces that bound this fluid."""
+        pieces = self.crossed.pieces
+        ends = (piece for piece, inner in zip(pieces.boundary, self.inner, strict=True) if inner)
+        return [*pieces.inside, *self.crossed.faces, *ends]
 
-    def outer_faces(self, opened: Sequence[KernelFace]) -> tuple[list[tuple[KernelFace, KernelFace]], list[KernelFace]]:
+    def outer_faces(self) -> tuple[list[tuple[KernelFace, KernelFace]], list[KernelFace]]:
         """The part's faces that are not open for this fluid, each with what has become of it, and rims of others."""
         originals = faces_of(self.filling.part.shape)
-        kept = [face for face in originals if not any(face.IsSame(other) for other in opened)]
+        kept = [face for face in originals if not any(face.IsSame(other) for other in self.filling.opened)]
         skin = list(self.hollow.skin_faces(self.crossed.pieces))
         return list(zip(kept, skin[: len(kept)], strict=True)), skin[len(kept) :]
 

@@ -99,7 +99,7 @@ class FillReport:
     by_sections : bool
         Whether it was cut without the kernel's booleans.
     shift : tuple of float
-        Of the lattice, in mm, where the kernel did not manage without.
+        Of the lattice, in mm, where cuts failed without, or left edges too short.
     seconds : dict
         By stage.
     cells_alike : bool

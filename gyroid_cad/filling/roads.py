@@ -83,10 +83,7 @@ def taken(road: Road, job: Job, infill: Infill, processes: int | None = None) ->
     if road == "sections":
         return _by_sections(job, infill)
     if road in ("crossings", "bodies"):
-        try:
-            return _by_crossings(job, infill, road == "bodies")
-        except np.linalg.LinAlgError as singular:
-            raise KernelError("an edge of the part lies along the lattice") from singular
+        return _by_crossings(job, infill, road == "bodies")
     return _by_booleans(job, infill, processes)
 
 
@@ -218,15 +215,18 @@ def crossed_by(
         return infill.contains(region, points)
 
     with job.timed("cut"):
-        cut = cross_part(
-            *infill.bounding(region, crossing),
-            job.boundary.boundary,
-            job.cell_size,
-            job.core.contains,
-            None if region.surface else in_region,
-            outer=outer,
-            progress=lambda done, count: report_progress(job.progress, "cut", done, count),
-        )
+        try:
+            cut = cross_part(
+                *infill.bounding(region, crossing),
+                job.boundary.boundary,
+                job.cell_size,
+                job.core.contains,
+                None if region.surface else in_region,
+                outer=outer,
+                progress=lambda done, count: report_progress(job.progress, "cut", done, count),
+            )
+        except np.linalg.LinAlgError as singular:
+            raise KernelError("an edge of the part lies along the lattice") from singular
     whole = infill.bounding(region, inside)
     middle = (job.part.low + job.part.high) / 2
 

@@ -322,6 +322,8 @@ class FaceSizes:
             self._numbers.Add(face)
             self._orientations.append(face.Orientation())
         self._measures, self._middle = measures, middle
+        self._others: list[tuple[float, float, bool]] = []
+        self._other_numbers = NumberedShapes()
 
     def of(self, shape: TopoDS_Shape) -> ShapeSize:
         """Its size; the volume negative if the shape is inside out, no centroid if the kernel is asked for a face."""
@@ -345,7 +347,16 @@ class FaceSizes:
         """Flux and area of a face, and its moment, None if the kernel is asked."""
         index = int(self._numbers.FindIndex(face)) - 1
         if index < 0:
-            return *measure_about(as_face(face), self._middle), None
+            return *self._of_other(as_face(face)), None
         sign = 1.0 if face.Orientation() == self._orientations[index] else -1.0
         measures = self._measures
         return sign * float(measures.flux[index]), float(measures.area[index]), sign * measures.moment[index]
+
+    def _of_other(self, face: TopoDS_Face) -> tuple[float, float]:
+        """Flux and area of a face that was not given: the kernel is asked once, for its integrals take long."""
+        forward = face.Orientation() == TopAbs_FORWARD
+        number = int(self._other_numbers.Add(face))
+        if number > len(self._others):
+            self._others.append((*measure_about(face, self._middle), forward))
+        flux, area, asked_forward = self._others[number - 1]
+        return flux if forward == asked_forward else -flux, area

@@ -21,7 +21,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError, ParameterError
-from gyroid_cad.kernel.check import compound_of, is_valid, measure, parts_of
+from gyroid_cad.kernel.check import compound_of, faces_of, is_valid, measure, parts_of
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
@@ -166,7 +166,7 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
     core = require_part(compound_of(cores))
     if opened:
         return _sharing(part, core, opened, skin)
-    return Hollow(tuple(_faces_of(part.shape)), core, len(_faces_of(core.shape)) * (False,), skin)
+    return Hollow(tuple(faces_of(part.shape)), core, len(faces_of(core.shape)) * (False,), skin)
 
 
 def hollow_round(part: Part, core: Part) -> Hollow:
@@ -188,9 +188,9 @@ def hollow_round(part: Part, core: Part) -> Hollow:
     images = [as_solid(image) for solid in core.solids for image in modified(fuse, solid)]
     _require_inside([image for image in images if not of_part.Contains(image)], part, core.volume)
     images = [image for image in images if of_part.Contains(image)]
-    faces = [face for image in images for face in _faces_of(image)]
+    faces = [face for image in images for face in faces_of(image)]
     inner = _set_of(faces)
-    pieces = [[as_face(piece) for piece in modified(fuse, face)] for face in _faces_of(part.shape)]
+    pieces = [[as_face(piece) for piece in modified(fuse, face)] for face in faces_of(part.shape)]
     own = _set_of(piece for some in pieces for piece in some)
     opened = tuple(own.Contains(face) for face in faces)
     skin = tuple(piece for some in pieces for piece in some if not inner.Contains(piece))
@@ -245,7 +245,7 @@ def openings_of(part: Part, given: Sequence[TopoDS_Shape]) -> list[TopoDS_Face]:
     ParameterError
         If no face of the part lies on one that is given.
     """
-    faces = _faces_of(part.shape)
+    faces = faces_of(part.shape)
     found: set[int] = set()
     for face in given:
         same = {k for k, own in enumerate(faces) if own.IsSame(face)} or _lying_on(face, faces)
@@ -276,7 +276,7 @@ def opened_faces(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> 
 
 def _has_face(part: Part, face: TopoDS_Face) -> bool:
     """Tell whether a face is one of the part's, or has some of these lying on it."""
-    faces = _faces_of(part.shape)
+    faces = faces_of(part.shape)
     return any(own.IsSame(face) for own in faces) or bool(_lying_on(face, faces))
 
 
@@ -319,7 +319,7 @@ def _shown(given: Sequence[TopoDS_Shape]) -> str:
 def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face], skin: float) -> Hollow:
     """Skin and core of a part with openings, once the part's faces there are split where the core comes to them."""
     target = FaceDistances(openings)
-    faces = _faces_of(core.shape)
+    faces = faces_of(core.shape)
     ends = [bool(target.distances(points_on(face, _POINTS_ON_FACE)).max() < _SAME_PLACE * skin) for face in faces]
     if not any(ends):
         raise KernelError("the kernel's core does not come to an opening")
@@ -332,29 +332,25 @@ def _sharing(part: Part, core: Part, openings: Sequence[TopoDS_Face], skin: floa
     for opening in openings:
         if not any(images.Contains(piece) for piece in modified(fuse, opening)):
             raise KernelError("the kernel's core does not come to an opening")
-    kept = [face for face in _faces_of(part.shape) if not any(face.IsSame(opening) for opening in openings)]
+    kept = [face for face in faces_of(part.shape) if not any(face.IsSame(opening) for opening in openings)]
     own = [*with_changes(kept, changed), *(piece for piece in rims if not images.Contains(piece))]
     inner = [face for face, is_end in zip(faces, ends, strict=True) if not is_end]
     shared = [piece for piece in rims if images.Contains(piece)]
     solids = solids_of([*with_changes(inner, changed), *shared])
     core = replace(core, shape=compound_of(solids), solids=tuple(solids), box=None)
     opened = _set_of(shared)
-    made = Hollow(tuple(own), core, tuple(bool(opened.Contains(face)) for face in _faces_of(core.shape)), skin)
+    made = Hollow(tuple(own), core, tuple(bool(opened.Contains(face)) for face in faces_of(core.shape)), skin)
     _require_all_of(part, made)
     return made
 
 
 def _require_all_of(part: Part, made: Hollow) -> None:
     """Raise if skin and core are not, together, the part."""
-    empty = Pieces((), tuple(_faces_of(made.core.shape)), tuple(range(len(made.opened))))
+    empty = Pieces((), tuple(faces_of(made.core.shape)), tuple(range(len(made.opened))))
     skin = sum(measure(solid)[0] for solid in made.solids(empty, (), lambda point: False))
     core = measure(made.core.shape)[0]
     if not abs(skin + core - part.volume) < _SAME_VOLUME * part.volume or not is_valid(made.core.shape):
         raise KernelError("the kernel parted the part wrongly into skin and core")
-
-
-def _faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
-    return [as_face(face) for face in parts_of(shape, TopAbs_FACE)]
 
 
 def _has(solid: TopoDS_Solid, face: TopoDS_Face) -> bool:

@@ -93,11 +93,7 @@ def near_misses(faces: LatticeFaces, boundary: Boundary, within: float) -> NearM
         How near, in mm.
     """
     pairs = pairs_of(faces, boundary)
-    flat, first = np.unique(faces.rims.ravel(), return_index=True)
-    owner, side = np.divmod(first, 4)
-    index = np.searchsorted(flat, faces.rims)
-    both = np.stack([index[pairs.face].ravel(), np.repeat(pairs.part, 4)], axis=1)
-    rim, part = np.unique(both, axis=0).T
+    _, owner, side, rim, part = pairs.by_rim()
     rims = faces.along_sides(owner, side, np.linspace(-1, 1, _ALONG_RIM))
     near_edges = _near_edges(faces, boundary, owner, side, rims, within)
     near_corners = _near_corners(faces, boundary.vertices, within)

@@ -139,7 +139,7 @@ class _Work:
         self.made = made
         faces, pairs = made.faces, made.pairs
         self.rims, self.fans, self.forward = faces.rims, faces.fans, faces.forward
-        self.rim_nodes = rim_nodes(pairs, self.rims, self.forward)
+        self.rim_nodes = rim_nodes(pairs)
         step_done()
         self.part_nodes = part_nodes(faces, made.boundary)
         step_done()

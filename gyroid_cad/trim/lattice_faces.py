@@ -181,6 +181,23 @@ class Pairs:
     face: Integers
     part: Integers
 
+    def by_rim(self) -> tuple[Integers, Integers, Integers, Integers, Integers]:
+        """Rims, each on the first face that has it, against every face of the part that one of its faces may meet.
+
+        Returns
+        -------
+        numbers, owner, side : ndarray of int, shape (rims,)
+            Numbers of the rims, and of which face, and which of its sides, each is looked at.
+        rim, part : ndarray of int, shape (m,)
+            Positions of rims in these arrays, and faces of the part.
+        """
+        numbers, first = np.unique(self.faces.rims.ravel(), return_index=True)
+        owner, side = np.divmod(first, 4)
+        index = np.searchsorted(numbers, self.faces.rims)
+        both = np.stack([index[self.face].ravel(), np.repeat(self.part, 4)], axis=1)
+        rim, part = np.unique(both, axis=0).T
+        return numbers, owner, side, rim, part
+
     def heights(
         self, pair: Integers, u: Floats, v: Floats, near: Floats | None = None, tangent: bool = False
     ) -> tuple[Floats, Floats, Floats, Floats]:

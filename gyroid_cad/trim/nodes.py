@@ -87,28 +87,19 @@ class PartNodes:
     points: Floats
 
 
-def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
+def rim_nodes(pairs: Pairs) -> RimNodes:
     """Find where rims cross the part's faces.
 
     Parameters
     ----------
     pairs : Pairs
-    rims : ndarray of int, shape (faces, 4)
-        Number of the rim along each side of a face; two faces that share one give it the same number.
-    forward : ndarray of bool, shape (faces, 4)
-        Whether the rim runs the way the side of the square does.
 
     Raises
     ------
     KernelError
         If a rim only touches the part, or crosses it at an edge of the part or at a corner of the face.
     """
-    # A rim is looked at on the first face that has it, against every face of the part that one of its faces may meet.
-    flat, first = np.unique(rims.ravel(), return_index=True)
-    owner, owned_side = np.divmod(first, 4)
-    index = np.searchsorted(flat, rims)
-    both = np.stack([index[pairs.face].ravel(), np.repeat(pairs.part, 4)], axis=1)
-    rim, part = np.unique(both, axis=0).T
+    flat, owner, owned_side, rim, part = pairs.by_rim()
     near = _may_cross(pairs, owner[rim], owned_side[rim], part)
     rim, part = rim[near], part[near]
     step = 2 / (_RIM_SAMPLES - 1)
@@ -133,7 +124,7 @@ def rim_nodes(pairs: Pairs, rims: Integers, forward: Booleans) -> RimNodes:
     rate, steepness = _rate(side, slopes), np.linalg.norm(slopes, axis=1)
     if np.any(np.abs(rate) <= _TOUCHING * steepness) or np.any(np.abs(along) > 1 - _AT_CORNER):
         raise KernelError("an edge of the lattice touches the part")
-    runs_on = forward[owner[rim[which]], side]
+    runs_on = pairs.faces.forward[owner[rim[which]], side]
     along, inwards = np.where(runs_on, along, -along), np.where(runs_on, rate > 0, rate < 0)
     order = np.lexsort((along, rim[which]))
     which = which[order]

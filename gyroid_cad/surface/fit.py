@@ -161,7 +161,7 @@ _CLOUD_RADII = 48
 _PLACES_PER_CONTROL_POINT = 2
 _FIRMNESS = 1e3
 # With fewer control points a side there are none to spare: turned, the fit gets further off than it gains.
-_FEWEST_TO_TURN = 6
+_FEWEST_TO_TURN = 7
 # Offset, in bounding-cell lengths, about which the two faces of a wall get the tangent planes: of walls a tenth of the
 # cell size thick.
 _OFFSET = 0.1
@@ -370,7 +370,7 @@ def _carry_whole_layers(net: Floats, knots: Floats, weights: Floats, rational: F
         quadrature @ (np.linalg.norm(area, axis=1) - dot(normals, area)),
         _TOTAL_CURVATURE - quadrature @ dot(normals, curvature),
     ]
-    free = inner_controls(len(weights), 2 if len(weights) > _FEWEST_TO_TURN else 1)
+    free = inner_controls(len(weights), 2 if len(weights) >= _FEWEST_TO_TURN else 1)
     functions = rational[:, free]
     spread = _least_squares(functions, quadrature, np.hstack(vectors)).reshape(-1, 2, 3)
     ways = np.tensordot(functions, spread, axes=1)

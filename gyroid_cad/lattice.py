@@ -113,11 +113,6 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         Built once and remembered; each call hands out a shape of its own that shares the geometry, so that
         moving one does not move another.
 
-        Parameters
-        ----------
-        progress : callable, optional
-            Called with (stage, done, total).
-
         Returns
         -------
         TopoDS_Solid
@@ -184,8 +179,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
             exact = self.exact_volume - built.islands.dropped_volume if known else None
             block = prod(self.cells) * self.cell_size**3
             density = built.volume / block if self.trim else self.volume_fraction
-            measures = (self.wall_thickness, density, exact)
-        return report_of(built, *measures)
+        return report_of(built, self.wall_thickness, density, exact)
 
     def write(
         self,
@@ -198,6 +192,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         kernel_check: bool = False,
         author: str = "",
         organisation: str = "",
+        pcurves: bool = False,
     ) -> None:
         """Write files; each path's ending chooses STEP (packed too: .stpz, .step.gz), BREP, STL, 3MF, OBJ or PLY.
 
@@ -211,6 +206,9 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         schema : {"ap214", "ap242"}
         author, organisation : str
             Of STEP files.
+        pcurves : bool
+            Write edges of STEP files with their curves in faces' parameters too, for receivers that do not make them:
+            the kernel builds the solid, and files grow by half.
         deviation : float, optional
             Of the triangles in STL and 3MF from the faces, in mm; if left out, a thousandth of the cell size, or a
             tenth of the wall if that is less.
@@ -234,7 +232,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
         >>> lattice.write("cell.step", "cell.stl", deviation=0.1)
         """
-        targets, header = require_formats(paths), StepHeader(schema, author, organisation)
+        targets, header = require_formats(paths), StepHeader(schema, author, organisation, pcurves)
         if deviation is not None:
             deviation = finite_number("deviation", deviation, "a length in mm, a finite number")
         if instances:
@@ -252,7 +250,9 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         for path in targets:
             if format_of(path) in TRIANGLE_FORMATS:
                 require_near_origin(path, self.fitted(progress).bounding_box(), self.deviation(deviation))
-        by_kernel = solid if kernel_check or self.trim or any(format_of(path) is BREP for path in solid) else []
+        by_kernel = (
+            solid if kernel_check or pcurves or self.trim or any(format_of(path) is BREP for path in solid) else []
+        )
         if by_kernel:
             self.built(progress).write(by_kernel, header, self.deviation(deviation), angle, progress)
         elif solid:

@@ -173,6 +173,7 @@ WRITTEN = {
     "organisation": Case(
         {"file": "made.step", "organisation": "A \\ B"}, lambda made, usual: "('A \\\\ B')" in header(made)
     ),
+    "pcurves": Case({"file": "made.step", "pcurves": True}, lambda made, usual: b"=PCURVE(" in made.file.read_bytes()),
     "deviation": Case({"file": "made.stl", "deviation": 0.2}, sized),
     "angle": Case({"file": "made.stl", "deviation": 0.5, "angle": 80}, sized),
     "check": Case(

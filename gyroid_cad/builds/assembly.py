@@ -94,6 +94,7 @@ class Assembly:
         progress: Progress | None = None,
         author: str = "",
         organisation: str = "",
+        pcurves: bool = False,
     ) -> None:
         """Write STEP assemblies. A file appears whole or not at all.
 
@@ -106,6 +107,8 @@ class Assembly:
             Called with (stage, done, total).
         author, organisation : str
             For the files' headers.
+        pcurves : bool
+            As of :meth:`gyroid_cad.Lattice.write`.
 
         Raises
         ------
@@ -116,7 +119,7 @@ class Assembly:
         ExportError
         """
 
-        targets, header = require_formats(paths, [STEP]), StepHeader(schema, author, organisation)
+        targets, header = require_formats(paths, [STEP]), StepHeader(schema, author, organisation, pcurves)
         require_memory(self.cells, _BYTES_PER_INSTANCE)
         if not self.cell.valid(progress):
             raise KernelError("the kernel finds the solid of one cell invalid; nothing was written")

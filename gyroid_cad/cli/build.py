@@ -99,7 +99,8 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
         if given["instances"]:
             report = lattice.assembly_report(progress)
         elif lattice.needs_solid(outputs):
-            report = lattice.report(progress, given["kernel_check"] or any(format_of(path) is BREP for path in outputs))
+            by_kernel = given["kernel_check"] or given["pcurves"] or any(format_of(path) is BREP for path in outputs)
+            report = lattice.report(progress, by_kernel)
         else:
             report = lattice.triangle_report(given["deviation"], progress)
         check = None if checked is None else checked(lattice, given["deviation"], progress)

@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 # Of the headers of STEP files.
-HEADER_KEYS = ("schema", "author", "organisation")
+HEADER_KEYS = ("schema", "author", "organisation", "pcurves")
 Declared = TypeVar("Declared", bound=Callable[..., object])
 
 
@@ -81,8 +81,13 @@ schema_option = click.option(
 
 
 def author_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of by whom a STEP file is."""
-    for name in reversed(HEADER_KEYS[1:]):
+    """Give a command the options of by whom a STEP file is, and what else it holds."""
+    function = click.option(
+        "--pcurves",
+        is_flag=True,
+        help="Write STEP with edges' curves in the parameters of faces too: half as large again.",
+    )(function)
+    for name in reversed(HEADER_KEYS[1:3]):
         function = click.option(f"--{name}", metavar="NAME", default="", help="For the headers of STEP files.")(
             function
         )

@@ -103,6 +103,7 @@ _WRITTEN = (
     _row("schema", **_WRITING),
     _row("author", **_WRITING),
     _row("organisation", **_WRITING),
+    _row("pcurves", **_WRITING),
     _row("deviation", **_WRITING),
     _row("angle", **_WRITING),
 )

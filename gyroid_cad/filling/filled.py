@@ -141,6 +141,7 @@ class Filled(HostShapes):
         progress: Progress | None = None,
         author: str = "",
         organisation: str = "",
+        pcurves: bool = False,
     ) -> None:
         """Write the filled part, as :meth:`gyroid_cad.Lattice.write` does a lattice.
 
@@ -156,7 +157,7 @@ class Filled(HostShapes):
         >>> filled.write("light.step", "light.stl", deviation=0.1)
         """
         targets, limit = require_formats(paths), self.deviation(deviation)
-        header = StepHeader(schema, author, organisation)
+        header = StepHeader(schema, author, organisation, pcurves)
         require_settings((1, 1, 1), limit, angle)
         for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
             if not self.report.closed:

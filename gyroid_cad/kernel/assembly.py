@@ -103,7 +103,12 @@ def write_assembly(
     product = product_name(path, name)
     names, colours = [named.name for named in part.faces], [named.colour for named in part.faces]
     written = StepPart(
-        part.name, read_step_bodies(part.shape), part.colour, face_names=names, face_colours=colours, size=part.size
+        part.name,
+        read_step_bodies(part.shape, header.pcurves),
+        part.colour,
+        face_names=names,
+        face_colours=colours,
+        size=part.size,
     )
     occurrences = [Occurrence(0, called, (place, *_AXES)) for called, place in places]
     whole = joint_size([_shifted(part.size, one.frame[0]) for one in occurrences])

@@ -73,9 +73,10 @@ def write_step(
     """Write a shape in millimetres.
 
     Solids or shells of known geometry are written from arrays, with what faces and edges have in common once, and
-    without curves in the parameter plane: an edge of ours lies on both its surfaces to within its tolerance, so that
-    readers find those curves again, and files are over a quarter smaller. Of anything else, such as an offset surface,
-    a loose face or a mirrored copy, the kernel's own writer makes the file, with these curves.
+    without curves in the parameter plane unless the header asks for them: an edge of ours lies on both its surfaces to
+    within its tolerance, so that readers find those curves again, and files are over a quarter smaller. Of anything
+    else, such as an offset surface, a loose face or a mirrored copy, the kernel's own writer makes the file, with these
+    curves.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ def write_step(
     """
     product = product_name(path, name)
     try:
-        parts, places = products_of(shape, product, labels, sizes)
+        parts, places = products_of(shape, product, labels, sizes, header.pcurves)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, header, escaped(product))
     else:

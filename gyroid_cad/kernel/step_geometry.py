@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from OCP.BRep import BRep_Tool
 from OCP.Geom import (
     Geom_BezierCurve,
     Geom_BezierSurface,
@@ -29,20 +30,37 @@ from OCP.Geom import (
     Geom_ToroidalSurface,
     Geom_TrimmedCurve,
 )
+from OCP.Geom2d import Geom2d_BSplineCurve, Geom2d_Curve, Geom2d_Line, Geom2d_TrimmedCurve
 from OCP.GeomConvert import GeomConvert
 from OCP.gp import gp_Dir, gp_Pnt
 from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Edge, TopoDS_Face
 
-from gyroid_cad.step.geometry import AxisPlacement, Geometry, Knots, Line, Placed, Spline, SweptSurface, Triple
+from gyroid_cad.step.geometry import (
+    AxisPlacement,
+    Geometry,
+    Knots,
+    Line,
+    ParameterLine,
+    Placed,
+    Spline,
+    SweptSurface,
+    Triple,
+)
+from gyroid_cad.step.text import counting
 
 __all__ = [
     "Geometries",
     "UnknownGeometryError",
     "axis_placement",
+    "parameter_curve",
     "read_geometry",
 ]
 
 Floats = NDArray[np.float64]
+
+# Of these the entity has the kernel's own parameters. A plane is left out: what lies in it is its own projection.
+_SAME_PARAMETERS = ("CYLINDRICAL_SURFACE", "SPHERICAL_SURFACE", "TOROIDAL_SURFACE")
 
 
 class UnknownGeometryError(Exception):
@@ -228,6 +246,56 @@ def _basis(geometry: Any) -> Geometry:
 
 def _triple(part: gp_Pnt | gp_Dir) -> Triple:
     return part.X(), part.Y(), part.Z()
+
+
+def parameter_curve(
+    edge: TopoDS_Edge, face: TopoDS_Face, surface: Geometry, curve: Geometry
+) -> Spline | ParameterLine | None:
+    """Read an edge's curve in a face's parameters, with the parameter that its curve in space has in the file.
+
+    Parameters
+    ----------
+    edge : TopoDS_Edge
+        Oriented as the face uses it: a seam has two such curves.
+    face : TopoDS_Face
+    surface, curve : Spline, Placed, Line or SweptSurface
+        What is written of the face and of the edge.
+
+    Returns
+    -------
+    Spline or ParameterLine or None
+        None where readers are left to project: on planes, on cones and swept surfaces, whose parameters are others in
+        the file, and where the curve is neither a straight line nor a spline.
+    """
+    same = isinstance(surface, Spline) or (
+        isinstance(surface, Placed) and surface.kind in _SAME_PARAMETERS and not surface.left_handed
+    )
+    found = BRep_Tool.CurveOnSurface_s(edge, face, 0.0, 0.0) if same else None
+    while isinstance(found, Geom2d_TrimmedCurve):
+        found = found.BasisCurve()
+    # Splines in space count their knots from 0, where these are evenly spaced.
+    start, step = counting(curve.knots[0][0]) if isinstance(curve, Spline) else (0.0, 1.0)
+    return _counted(found, start, step)
+
+
+def _counted(found: Geom2d_Curve | None, start: float, step: float) -> Spline | ParameterLine | None:
+    if isinstance(found, Geom2d_Line):
+        place, way = found.Location(), found.Direction()
+        u, v, du, dv = place.X(), place.Y(), way.X(), way.Y()
+        return ParameterLine((u + start * du, v + start * dv), (du, dv), step)
+    if isinstance(found, Geom2d_BSplineCurve) and not found.IsPeriodic():
+        spline = _parameter_spline(found)
+        ((values, counts),) = spline.knots
+        return replace(spline, knots=((tuple(((np.array(values) - start) / step).tolist()), counts),))
+    return None
+
+
+def _parameter_spline(curve: Geom2d_BSplineCurve) -> Spline:
+    count = curve.NbPoles()
+    poles = [(pole.X(), pole.Y()) for pole in (curve.Pole(i) for i in range(1, count + 1))]
+    weights = np.array([curve.Weight(i) for i in range(1, count + 1)]) if curve.IsRational() else None
+    knots = _knots(curve.Knots(), curve.Multiplicities())
+    return Spline((curve.Degree(),), np.array(poles), weights, (knots,), (False,))
 
 
 _READERS: dict[type, Callable[[Any], Geometry]] = {

@@ -27,8 +27,9 @@ from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Iterator, TopoDS_Shape, 
 
 from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid, as_wire
-from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement
+from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement, parameter_curve
 from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
+from gyroid_cad.step.geometry import ParameterCurve
 from gyroid_cad.step.products import UNLABELLED, BodyLabels, Occurrence, StepPart
 from gyroid_cad.wall.areas import ShapeSize
 
@@ -38,19 +39,29 @@ __all__ = ["products_of", "read_step_bodies", "require_bodies"]
 _SAMPLES = np.arange(1, 18) * (np.sqrt(5) - 1) / 2 % 1
 
 
-def read_step_bodies(shape: TopoDS_Shape) -> list[StepBody]:
+def read_step_bodies(shape: TopoDS_Shape, pcurves: bool = False) -> list[StepBody]:
     """Read the solids of a shape, or its shells if it has none, each with edges and vertices of its own.
+
+    Parameters
+    ----------
+    shape : TopoDS_Shape
+    pcurves : bool
+        Whether to read the curves of edges in the parameters of their faces as well.
 
     Raises
     ------
     UnknownGeometryError
         If it holds anything that is not known here.
     """
-    return [_Reading(body).read for body in parts_of(shape, require_bodies(shape))]
+    return [_Reading(body, pcurves).read for body in parts_of(shape, require_bodies(shape))]
 
 
 def products_of(
-    shape: TopoDS_Shape, name: str, labels: BodyLabels = UNLABELLED, sizes: Sequence[ShapeSize] = ()
+    shape: TopoDS_Shape,
+    name: str,
+    labels: BodyLabels = UNLABELLED,
+    sizes: Sequence[ShapeSize] = (),
+    pcurves: bool = False,
 ) -> tuple[list[StepPart], list[Occurrence]]:
     """Return the parts that a shape is written as, and their places if it has a solid in several.
 
@@ -63,6 +74,8 @@ def products_of(
         Of the bodies as the kernel counts them; of those in several places they are left out.
     sizes : sequence of ShapeSize
         One a body, or none; of bodies in several places, or of others than there are, they are left out.
+    pcurves : bool
+        As of :func:`read_step_bodies`.
 
     Raises
     ------
@@ -74,14 +87,17 @@ def products_of(
         own = sizes if len(sizes) == len(bodies) else ()
         part = StepPart(
             name,
-            read_step_bodies(shape),
+            read_step_bodies(shape, pcurves),
             body_names=labels.names,
             body_colours=labels.colours,
             face_names=labels.face_names,
             body_sizes=own,
         )
         return [part], []
-    parts = [StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind))) for kind in range(1, kinds.Extent() + 1)]
+    parts = [
+        StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind), pcurves))
+        for kind in range(1, kinds.Extent() + 1)
+    ]
     places = [axis_placement(body.Location()) for body in bodies]
     return parts, [Occurrence(kind, f"{name} {kind + 1}", place) for kind, place in zip(which, places, strict=True)]
 
@@ -105,9 +121,9 @@ def require_bodies(shape: TopoDS_Shape) -> TopAbs_ShapeEnum:
 class _Reading:
     """The walk through a body."""
 
-    def __init__(self, body: TopoDS_Shape) -> None:
+    def __init__(self, body: TopoDS_Shape, pcurves: bool) -> None:
         self.read = StepBody(solid=body.ShapeType() == TopAbs_SOLID)
-        self._surfaces, self._curves = Geometries(), Geometries()
+        self._surfaces, self._curves, self._pcurves = Geometries(), Geometries(), pcurves
         self._edges, self._vertices = NumberedShapes(), NumberedShapes()
         self._meetings: list[tuple[float, TopoDS_Edge, TopoDS_Face | TopoDS_Vertex]] = []
         # A solid is what its outer shell holds; that the kernel has it inside out is not for STEP to say.
@@ -134,7 +150,21 @@ class _Reading:
         if not wires:
             raise UnknownGeometryError("a face without a border")
         loops = [loop for wire in wires for loop in self._loops(wire, face, on_ball)]
+        if self._pcurves:
+            self._read_pcurves(face, surface, {edge for loop in loops for edge, _ in loop.uses})
         return StepFace(surface, (_along(face) != turned), loops)
+
+    def _read_pcurves(self, face: TopoDS_Face, surface: int, written: set[int]) -> None:
+        seen: set[tuple[int, bool]] = set()
+        for edge in map(as_edge, parts_of(face.Oriented(TopAbs_FORWARD), TopAbs_EDGE)):
+            use = int(self._edges.FindIndex(edge)) - 1, _along(edge)
+            if use[0] not in written or use in seen:
+                continue
+            seen.add(use)
+            curve = self._curves.found[self.read.edges[use[0]][2]]
+            found = parameter_curve(edge, face, self._surfaces.found[surface], curve)
+            if found is not None:
+                self.read.pcurves.append(ParameterCurve(use[0], surface, found))
 
     def _loops(self, wire: TopoDS_Shape, face: TopoDS_Face, on_ball: bool) -> list[StepLoop]:
         if wire.ShapeType() != TopAbs_WIRE:

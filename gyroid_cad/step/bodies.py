@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gyroid_cad.step.geometry import Geometry, Placed, Spline, Triple
+from gyroid_cad.step.geometry import Geometry, ParameterCurve, Placed, Spline, Triple
+from gyroid_cad.step.pcurves import edge_curves
 from gyroid_cad.step.text import StepText, quoted, refs
 
 __all__ = ["LEAST_GAP", "EdgeUse", "StepBody", "StepFace", "StepLoop", "WritableBody", "write_shells"]
@@ -77,6 +78,8 @@ class StepBody:
     surfaces, curves : list of Spline, Placed, Line or SweptSurface
     vertices : list of tuple of float
     edges : list of (first vertex, last vertex, curve)
+    pcurves : list of ParameterCurve
+        Of edges, in the parameters of the faces that they bound, where they are wanted.
     shells : list of list of StepFace
     outer : int
         Which of them is not round a void.
@@ -88,6 +91,7 @@ class StepBody:
     curves: list[Geometry] = field(default_factory=list)
     vertices: list[Triple] = field(default_factory=list)
     edges: list[tuple[int, int, int]] = field(default_factory=list)
+    pcurves: list[ParameterCurve] = field(default_factory=list)
     shells: list[list[StepFace]] = field(default_factory=list)
     outer: int = 0
     solid: bool = True
@@ -122,7 +126,7 @@ class StepBody:
         edges = np.zeros(0, dtype=np.int64)
         if self.edges:
             first, last, curve = np.array(self.edges).T
-            curves = geometries[len(self.surfaces) :][curve]
+            curves = edge_curves(text, geometries[len(self.surfaces) :][curve], geometries, self.pcurves)
             edges = text.table("EDGE_CURVE('',", vertices[first], ",", vertices[last], ",", curves, ",.T.)")
         all_faces = [face for shell in self.shells for face in shell]
         forward = np.array([face.forward for face in all_faces])

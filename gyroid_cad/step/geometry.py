@@ -7,7 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["AxisPlacement", "Geometry", "Knots", "Line", "Placed", "Spline", "SweptSurface", "Triple"]
+__all__ = [
+    "AxisPlacement",
+    "Geometry",
+    "Knots",
+    "Line",
+    "ParameterCurve",
+    "ParameterLine",
+    "Placed",
+    "Spline",
+    "SweptSurface",
+    "Triple",
+]
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -25,7 +36,7 @@ class Spline:
     degrees : tuple of int
         One of a curve, two of a surface.
     poles : ndarray, shape (n, 3) or (n, m, 3)
-        In mm.
+        In mm; of a curve in the parameters of a surface (n, 2).
     weights : ndarray, shape (n,) or (n, m), or None
         None where it is polynomial.
     knots : tuple of (values, multiplicities)
@@ -93,6 +104,40 @@ class SweptSurface:
     curve: Spline | Placed | Line
     direction: Triple
     origin: Triple | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterLine:
+    """A straight line in the parameters of a surface.
+
+    Attributes
+    ----------
+    origin, direction : tuple of float
+        The direction of length 1.
+    rate : float
+        How far it goes while its parameter grows by 1.
+    """
+
+    origin: tuple[float, float]
+    direction: tuple[float, float]
+    rate: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterCurve:
+    """An edge's curve in the parameters of one of its surfaces (PCURVE).
+
+    Attributes
+    ----------
+    edge, surface : int
+        Numbers in their body.
+    curve : Spline or ParameterLine
+        With the parameter that the edge's curve in space has in the file.
+    """
+
+    edge: int
+    surface: int
+    curve: Spline | ParameterLine
 
 
 Geometry = Spline | Placed | Line | SweptSurface

@@ -24,13 +24,15 @@ _NOT_TEXT = ("Cc", "Cs", "Zl", "Zp")
 
 @dataclass(frozen=True, slots=True)
 class StepHeader:
-    """Schema, author and organisation of STEP files.
+    """Schema, author and organisation of STEP files, and whether they hold curves in faces' parameters.
 
     Attributes
     ----------
     schema : {"ap214", "ap242"}
     author, organisation : str
         In any script; unnamed if left out.
+    pcurves : bool
+        Whether edges have curves in the parameters of their faces too, for receivers that do not make them.
 
     Raises
     ------
@@ -40,6 +42,7 @@ class StepHeader:
     schema: Schema = "ap214"
     author: str = ""
     organisation: str = ""
+    pcurves: bool = False
 
     def __post_init__(self) -> None:
         require_schema(self.schema)

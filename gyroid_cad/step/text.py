@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gyroid_cad.step.digits import decimal_text, integer_text, joined_rows, text_rows
 from gyroid_cad.step.geometry import Geometry, Knots, Line, Placed, Spline, SweptSurface, Triple
 
-__all__ = ["StepText", "escaped", "flag", "quoted", "real", "refs", "step_knots"]
+__all__ = ["StepText", "counting", "escaped", "flag", "quoted", "real", "refs", "step_knots"]
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -167,6 +167,7 @@ class StepText:
         knots: tuple[Knots, ...],
         closed: tuple[bool, ...],
         weights: Floats | None = None,
+        counted: bool = True,
     ) -> Integers:
         """Write splines that differ by their control points alone.
 
@@ -178,11 +179,14 @@ class StepText:
             Numbers of the control points.
         weights : ndarray, shape (n,) or (n, m), optional
             None where they are polynomial.
+        counted : bool
+            Whether a curve's knots become 0, 1, 2 and so on where they are evenly spaced (:func:`counting`).
 
         Returns
         -------
         ndarray of int, shape (k,)
         """
+        knots = _counted(knots) if counted else knots
         kind = "CURVE" if len(degrees) == 1 else "SURFACE"
         start = f"{_listed(degrees)},"
         end = f",.UNSPECIFIED.,{','.join(map(flag, closed))},.F."
@@ -302,16 +306,34 @@ def _listed(numbers: Iterable[int]) -> str:
 @lru_cache(maxsize=256)
 def _knots(knots: tuple[Knots, ...]) -> str:
     multiplicities = [f"({_listed(counts)})" for _, counts in knots]
-    # By the square from -1 to 1 a lattice's faces are known again in a file.
-    values = [_nested(_counted(list(some)) if len(knots) == 1 else list(some)) for some, _ in knots]
+    values = [_nested(list(some)) for some, _ in knots]
     return ",".join([*multiplicities, *values, ".UNSPECIFIED."])
 
 
-def _counted(values: list[float]) -> list[float]:
-    """Knots that are evenly spaced as 0, 1, 2 and so on: the same spline, in a tenth of the digits."""
+def counting(values: Sequence[float]) -> tuple[float, float]:
+    """Parameter where a curve's knots begin to count, and its step from each to the next; 0 and 1 if they are uneven.
+
+    Knots that are evenly spaced are written as 0, 1, 2 and so on: the same spline, in a tenth of the digits.
+
+    Examples
+    --------
+    >>> counting((-1.0, 0.0, 1.0)), counting((-1.0, -0.5, 1.0))
+    ((-1.0, 1.0), (0.0, 1.0))
+    >>> counting((0.25, 0.75))
+    (0.25, 0.5)
+    """
     steps = np.diff(values)
     even = bool(np.ptp(steps) <= _EVEN * steps.mean())
-    return [float(number) for number in range(len(values))] if even else values
+    return (float(values[0]), float(steps.mean())) if even else (0.0, 1.0)
+
+
+def _counted(knots: tuple[Knots, ...]) -> tuple[Knots, ...]:
+    # By the square from -1 to 1 a lattice's faces are known again in a file.
+    if len(knots) > 1:
+        return knots
+    ((values, counts),) = knots
+    even = counting(values) != (0.0, 1.0)
+    return ((tuple(map(float, range(len(values)))) if even else values, counts),)
 
 
 def _nested(values: list[float] | list[list[float]]) -> str:

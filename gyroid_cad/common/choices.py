@@ -12,6 +12,7 @@ from typing import Literal, get_args
 
 __all__ = [
     "BLOCK_KINDS",
+    "BODY_NAMES",
     "FITS",
     "KINDS",
     "PROFILES",
@@ -19,6 +20,7 @@ __all__ = [
     "SCHEMAS",
     "SURFACE_NAMES",
     "TRIMS",
+    "BodyName",
     "CheckedBy",
     "FitName",
     "Kind",
@@ -30,6 +32,8 @@ __all__ = [
 ]
 
 Kind = Literal["sheet", "network-a", "network-b", "channels", "bodies", "surface"]
+# Of bodies that share their faces: whose are written as regions of an STL file.
+BodyName = Literal["all", "wall", "fluid-a", "fluid-b", "skin"]
 SurfaceName = Literal["gyroid", "diamond", "primitive"]
 Trim = Literal["box"]
 # To a filled part: through exact solids, or through triangles alone.
@@ -51,4 +55,5 @@ TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)
 ROUTES: tuple[Route, ...] = get_args(Route)
 PROFILES: tuple[Profile, ...] = get_args(Profile)
+BODY_NAMES: tuple[BodyName, ...] = get_args(BodyName)
 FITS: tuple[FitName, ...] = get_args(FitName)

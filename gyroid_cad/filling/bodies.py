@@ -14,7 +14,7 @@ from gyroid_cad.filling.wanted import SKIN, WALL
 from gyroid_cad.kernel.check import faces_of
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.crossed import FaceSizes
-from gyroid_cad.kernel.shells import fused_solids
+from gyroid_cad.kernel.shells import connected_shells, fused_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelFace, KernelShape
 from gyroid_cad.kernel.split import Pieces
@@ -22,7 +22,7 @@ from gyroid_cad.trim.islands import SMALL_ISLAND
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.wall.areas import ShapeSize
 
-__all__ = ["Crossed", "FaceNames", "Made", "made_of", "merged_chips"]
+__all__ = ["Crossed", "FaceNames", "Made", "made_of", "merged_chips", "mouths_of"]
 
 Floats = NDArray[np.float64]
 # Solids by the name of what they are.
@@ -148,6 +148,21 @@ def made_of(solid: KernelShape, names: tuple[str, ...], sizes: FaceSizes) -> Mad
     size, areas = sizes.of(solid), sizes.areas(solid)
     wetted = [name.split("/")[0] in (WALL, SKIN) for name in names]
     return Made(solid, size.volume, size.area, size.centroid, names, float(areas[wetted].sum()))
+
+
+def mouths_of(made: Made) -> int:
+    """Count the mouths of a fluid's body: the openings of a skin that it comes to, or else faces that are connected.
+
+    Parameters
+    ----------
+    made : Made
+        With the names of its faces.
+    """
+    ends = [name.split("/")[0] not in (WALL, SKIN) for name in made.face_names]
+    named = {name for name, is_end in zip(made.face_names, ends, strict=True) if is_end}
+    if not all("/face " in name for name in named):
+        return len(named)
+    return len(connected_shells([face for face, is_end in zip(faces_of(made.shape), ends, strict=True) if is_end]))
 
 
 def merged_chips(bodies: Bodies, volume_of: Callable[[KernelShape], float], one_cell: float) -> Bodies:

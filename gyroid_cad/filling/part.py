@@ -98,6 +98,8 @@ class FilledBy(Protocol):
     @property
     def seconds(self) -> dict[str, float]: ...
     def near_misses(self, frame: Frame, within: float) -> NearMisses: ...
+    def timed(self, stage: str) -> AbstractContextManager[None]: ...
+    def of(self, fluid: str) -> Filling: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +175,10 @@ class Filling:
     def cells(self) -> float:
         """Number of cells that have the volume of what is filled."""
         return self.core.volume / self.cell_size**3
+
+    def of(self, fluid: str) -> Filling:
+        """The filling that gives a fluid: this one."""
+        return self
 
     def run(self, frame: Frame) -> Outcome:
         """Fill, with the lattice a little shifted where the kernel does not manage otherwise.

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError, ParameterError
@@ -127,7 +127,13 @@ class Hollow:
         return with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
 
 
-def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Hollow:
+def hollow(
+    part: Part,
+    skin: float,
+    openings: Sequence[TopoDS_Shape] = (),
+    plugged: Sequence[TopoDS_Face] = (),
+    plug: float | None = None,
+) -> Hollow:
     """Part a part into a solid skin and the core inside.
 
     The skin lies on the inner side of all faces but the openings. Regions too thin for a core are skin altogether.
@@ -139,6 +145,10 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
         Its thickness, in mm.
     openings : sequence of TopoDS_Shape
         Faces, as of :func:`openings_of`, at which the core comes to the surface, but for a rim as wide as the skin.
+    plugged : sequence of TopoDS_Face
+        Others of the part's faces, below which the skin is thicker.
+    plug : float, optional
+        Its thickness there, in mm.
 
     Raises
     ------
@@ -163,10 +173,31 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
         if deep > skin
         for core in core_of(solid, faces, skin, depth)
     ]
+    if plug is not None and plug > skin:
+        cores = _below_plugs(part, cores, plugged, plug)
     core = require_part(compound_of(cores))
     if opened:
         return _sharing(part, core, opened, skin)
     return Hollow(tuple(faces_of(part.shape)), core, len(faces_of(core.shape)) * (False,), skin)
+
+
+def _below_plugs(
+    part: Part, cores: Sequence[TopoDS_Solid], plugged: Sequence[TopoDS_Face], plug: float
+) -> list[TopoDS_Solid]:
+    """Cores less what lies above plugs: whatever is not as deep as they are below the faces that have them."""
+    deeper: list[TopoDS_Solid] = []
+    for solid in part.solids:
+        others = [face for face in faces_of(solid) if not any(face.IsSame(other) for other in plugged)]
+        depths = Depths(solid, others)
+        deepest, place = depths.deepest(plug) if depths.kept else (plug, np.zeros(3))
+        if depths.kept and deepest <= plug:
+            raise ParameterError("plug", plug, f"less than about {deepest:.3g} mm, round {shown_place(place)}")
+        deeper += core_of(solid, others, plug, depths) if depths.kept else [solid]
+    common = BRepAlgoAPI_Common(compound_of(cores), compound_of(deeper)).Shape()
+    left = [as_solid(solid) for solid in parts_of(common, TopAbs_SOLID)]
+    if not left:
+        raise ParameterError("plug", plug, "less: it leaves nothing of the core")
+    return left
 
 
 def hollow_round(part: Part, core: Part) -> Hollow:

@@ -31,13 +31,19 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact, \
+    kind
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
     align : Align, tuple of Align or None
         None leaves the block of cells with its corner at the origin, as ``Lattice`` has it.
     mode : Mode
+
+    Attributes
+    ----------
+    children : tuple of Part
+        Of several bodies, labelled by their names.
 
     Raises
     ------
@@ -71,6 +77,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         surface: SurfaceName = "gyroid",
         keep_islands: bool = False,
         compact: float | None = None,
+        kind: Kind = "sheet",
     ) -> None:
         self.lattice = Lattice(
             cells,
@@ -85,6 +92,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
             surface,
             keep_islands=keep_islands,
             compact=compact,
+            kind=kind,
         )
         # A solid where it is one, as the host's own objects begin: the place of a part would be lost in its ``locate``.
         part = Part.cast(self.lattice.solid())
@@ -92,6 +100,9 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
             # The host would measure the box on the kernel's faces; the control nets give it at once.
             part = part.moved(Location(to_align_offset(*self.lattice.bounding_box(), align)))
         super().__init__(part=part, rotation=rotation, align=None, mode=mode)
+        if len(named := self.lattice.named_solids()) > 1:
+            solids = zip(named, self.solids(), strict=True)
+            self.children = [Part([solid], label=name) for name, solid in solids]
 
 
 class GyroidFill(Part):  # type: ignore[misc]

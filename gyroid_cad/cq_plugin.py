@@ -47,12 +47,14 @@ def gyroid(
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
     compact: float | None = None,
+    kind: Kind = "sheet",
 ) -> Plane:
     """A lattice of the gyroid, or of another surface, at each point of the stack.
 
     Parameters
     ----------
-    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact
+    cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact, \
+    kind
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -66,6 +68,7 @@ def gyroid(
     Returns
     -------
     Workplane
+        Of several bodies each is tagged by its name: ``result.solids(tag="fluid-a")``.
 
     Raises
     ------
@@ -91,13 +94,18 @@ def gyroid(
         surface,
         keep_islands=keep_islands,
         compact=compact,
+        kind=kind,
     )
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
     if len(per_axis) != 3:
         raise ParameterError("centered", centered, "True, False or three of them")
     offset = [-(a + b) / 2 if middle else -a for a, b, middle in zip(low, high, per_axis, strict=True)]
-    shape = lattice.to_cadquery().moved(cq.Location(cq.Vector(*offset)))
+    place = cq.Location(cq.Vector(*offset))
+    if len(named := lattice.named_solids()) > 1:
+        for name, solid in named.items():
+            self.eachpoint(cq.Shape.cast(solid).moved(place).moved, True, False).tag(name)
+    shape = lattice.to_cadquery().moved(place)
     made: Plane = self.eachpoint(shape.moved, True, combine, clean)
     return made
 

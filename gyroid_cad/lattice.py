@@ -12,7 +12,7 @@ from gyroid_cad.builds.meshes import LatticeMeshes
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.choices import BLOCK_KINDS, Schema
 from gyroid_cad.common.formats import (
     BREP,
     TRIANGLE_FORMATS,
@@ -29,14 +29,15 @@ from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture, wall_picture
 from gyroid_cad.render.picture import CAMERA, MOST_DRAWN_PATCHES, SIZE, require_view
 from gyroid_cad.step.header import StepHeader
-from gyroid_cad.wall.fitted import FittedWall, fitted_wall
-from gyroid_cad.wall.offset import Wall
+from gyroid_cad.wall.limits import require_sheet
 from gyroid_cad.wall.parameters import LatticeParameters, MapLike
 
 if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import Assembly, AssemblyReport
     from gyroid_cad.builds.solid import Build
     from gyroid_cad.builds.whole import WholeBuild
+    from gyroid_cad.filling.filled import Filled
+    from gyroid_cad.filling.report import FillReport
     from gyroid_cad.kernel.solid import KernelShape
 
 __all__ = ["Lattice", "LatticeReport", "MapLike"]
@@ -89,6 +90,9 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         maps turn and move with it.
     compact : float, optional
         Largest deviation in mm instead of ``fit`` or ``tolerance``, met by the fewest control points, 5 or more a side.
+    kind : {"sheet", "network-a", "network-b", "channels", "bodies"}
+        Of a lattice that is trimmed: the wall, or what :func:`~gyroid_cad.fill` makes of the block. A network's density
+        is its own.
 
     Raises
     ------
@@ -102,34 +106,6 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
     >>> print(f"{lattice.volume_fraction:.4f}")
     0.2452
     """
-
-    def wall(self) -> Wall:
-        """Control nets of the wall's faces, in mm, and the cell complex they belong to.
-
-        Raises
-        ------
-        FitError
-            If the fit's edges do not meet those of its neighbours.
-
-        Examples
-        --------
-        >>> wall = Lattice((1, 1, 1), 10, thickness=0.8).wall()
-        >>> wall.complex.patch_count, wall.face(0, side=1).evaluate(0.0, 0.0).shape
-        (24, (3,))
-        """
-        return self.fitted().wall
-
-    def bounding_box(self) -> tuple[Point, Point]:
-        """Lowest and highest corner of the box round the wall, in mm.
-
-        Examples
-        --------
-        >>> low, high = Lattice((1, 1, 1), 10, thickness=0.8).bounding_box()
-        >>> [round(x, 2) for x in low], [round(x, 2) for x in high]
-        ([-2.73, -2.73, -2.73], [12.73, 12.73, 12.73])
-        """
-        low, high = (corner.tolist() for corner in self.fitted().bounding_box())
-        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
 
     def solid(self, progress: Progress | None = None) -> KernelShape:
         """The lattice as a closed solid, checked.
@@ -156,20 +132,33 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> Lattice((1, 1, 1), 10, thickness=0.8).solid().ShapeType()
         <TopAbs_ShapeEnum.TopAbs_SOLID: 2>
         """
-        return self.built(progress).solid()
+        return self.built(progress).solid() if self._of_wall else self.filled(progress).solid()
 
     def named_solids(self) -> dict[str, KernelShape]:
-        """The solid under the name of its surface, as hosts show it.
+        """The solid under the name of its surface, as hosts show it; of a kind but the sheet all under their own names.
 
         Examples
         --------
         >>> list(Lattice((1, 1, 1), 10, thickness=0.8).named_solids())
         ['gyroid']
         """
-        return {self.surface: self.solid()}
+        return {self.surface: self.solid()} if self._of_wall else self.filled().named_solids()
 
-    def report(self, progress: Progress | None = None, kernel_check: bool = False) -> LatticeReport:
-        """Build the solid if it isn't yet, check it, and say what it is.
+    def filled(self, progress: Progress | None = None) -> Filled:
+        """The block as a part that was filled: what a trimmed lattice of any kind but the sheet is.
+
+        Examples
+        --------
+        >>> made = Lattice((1, 1, 1), 10, thickness=0.8, trim="box", kind="bodies").filled()
+        >>> list(made.domains), round(sum(made.report.volumes.values()), 6)
+        (['wall', 'fluid-a', 'fluid-b'], 1000.0)
+        """
+        from gyroid_cad.filling.block import filled_block
+
+        return filled_block(self, progress)
+
+    def report(self, progress: Progress | None = None, kernel_check: bool = False) -> LatticeReport | FillReport:
+        """Build the solid if it isn't yet, check it, and say what it is; of a kind but the sheet as a part filled.
 
         Whole patches are checked by the numbers of their edges and their control nets, as :meth:`write` does, unless
         ``kernel_check`` has the kernel build and check the solid too; one that is trimmed it does in any case.
@@ -180,6 +169,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> report.valid, report.closed, report.faces
         (True, True, 84)
         """
+        if not self._of_wall:
+            return self.filled(progress).report
         built = self.built(progress) if self.trim or kernel_check else self._whole(progress)
         built.valid(progress)
         with built.timed("fit report"):
@@ -249,6 +240,10 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
             require_settings((1, 1, 1), deviation, angle)
             self.assembly(progress).write(*targets, **asdict(header), progress=progress)
             return
+        if not self._of_wall:
+            made = self.filled(progress)
+            made.write(*targets, **asdict(header), deviation=deviation, angle=angle, progress=progress)
+            return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
         require_settings(self.cells, deviation, angle, solid=bool(solid))
@@ -291,9 +286,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> Lattice((3, 2, 1), 10, thickness=0.8).assembly_report().instances
         6
         """
-        from gyroid_cad.builds.assembly import assembly_report
-
-        return assembly_report(self.assembly(progress), self.wall_thickness, self.volume_fraction, self.exact_volume)
+        return self.assembly(progress).report(self.wall_thickness, self.volume_fraction, self.exact_volume)
 
     def needs_solid(self, paths: Iterable[str | os.PathLike[str]]) -> bool:
         """Tell whether files with these endings need the solid: triangles of whole patches do not.
@@ -368,33 +361,17 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         # With it the kernel is loaded, which triangles and meshes do without.
         from gyroid_cad.builds.solid import build
 
+        require_sheet(self.kind)
         made = build(self.spec(), progress)
         if self.trim:
             made.islands.warn()
         return made
 
+    @property
+    def _of_wall(self) -> bool:
+        return self.kind == BLOCK_KINDS[0]
+
     def _whole(self, progress: Progress | None = None) -> WholeBuild:
         from gyroid_cad.builds.whole import whole_build
 
         return whole_build(self.spec(), progress)
-
-    def fitted(self, progress: Progress | None = None) -> FittedWall:
-        """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked.
-
-        Examples
-        --------
-        >>> Lattice((1, 1, 1), 10, thickness=0.8).fitted().min_thickness
-        0.8
-        """
-        return fitted_wall(self.spec(), progress)
-
-    def deviation(self, given: float | None = None) -> float:
-        """Return the largest distance of triangles from the faces, in mm: the usual one if none is given.
-
-        Examples
-        --------
-        >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
-        >>> lattice.deviation(), lattice.deviation(0.2)
-        (0.01, 0.2)
-        """
-        return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given

@@ -204,6 +204,9 @@ CASES: dict[str, dict[str, Case]] = {
         "control points": Case({"control points": 6}, lambda made, usual: (made.poles, usual.poles) == (6, 4)),
         "trim": Case({"trim": "box"}, lambda made, usual: near(made.between_corners, 10, 1e-6) and made.solids == 1),
         "keep islands": Case({"trim": "box", "keep islands": True}, lambda made, usual: made.solids == 3),
+        "kind": Case(
+            {"trim": "box", "kind": "bodies"}, lambda made, usual: near(made.volume, 1000) and made.solids == 3
+        ),
         "scale field": Case({"scale field": "1 + 0.02*x"}, grown),
         "map": Case({"map": "bend:angle=40"}, lambda made, usual: not near(made.extent, usual.extent)),
         "origin": Case({"origin": (5, 6, 7)}, lambda made, usual: near(made.box - usual.box, [[5, 6, 7]] * 2, 1e-6)),

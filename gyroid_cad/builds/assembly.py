@@ -23,7 +23,7 @@ from gyroid_cad.step.header import StepHeader
 from gyroid_cad.wall.areas import joint_size
 from gyroid_cad.wall.fitted import LatticeSpec
 
-__all__ = ["Assembly", "AssemblyReport", "assembly", "assembly_report"]
+__all__ = ["Assembly", "AssemblyReport", "assembly"]
 
 PART_NAME = "CC"
 # Peak memory of an occurrence in the kernel's document and its writer, as measured, rounded up.
@@ -76,6 +76,16 @@ class Assembly:
             kinds = ["side_0", "side_1", *(f"edge_{k + 1}" for k in np.flatnonzero(free[patch]))]
             faces += [NamedFace(face, f"{name}_{kind}", colour) for face, kind in zip(some, kinds, strict=True)]
         return NamedPart(solid, PART_NAME, GREEN, faces, joint_size(self.cell.sizes))
+
+    def report(self, thickness: float, density: float, volume_exact: float) -> AssemblyReport:
+        """Report on the assembly.
+
+        Parameters
+        ----------
+        thickness, density, volume_exact : float
+            Of the exact lattice.
+        """
+        return _report(self, thickness, density, volume_exact)
 
     def write(
         self,
@@ -200,15 +210,7 @@ def assembly(spec: LatticeSpec, progress: Progress | None = None) -> Assembly:
     return Assembly(spec.cells, spec.grading.cell_size, one)
 
 
-def assembly_report(made: Assembly, thickness: float, density: float, volume_exact: float) -> AssemblyReport:
-    """The report on an assembly.
-
-    Parameters
-    ----------
-    made : Assembly
-    thickness, density, volume_exact : float
-        Of the exact lattice.
-    """
+def _report(made: Assembly, thickness: float, density: float, volume_exact: float) -> AssemblyReport:
     count = prod(made.cells)
     return AssemblyReport(
         cells=made.cells,

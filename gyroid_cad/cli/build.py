@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from gyroid_cad.builds.assembly import AssemblyReport
     from gyroid_cad.builds.report import LatticeReport
     from gyroid_cad.builds.triangles import TriangleReport
+    from gyroid_cad.filling.report import FillReport
+
+    _Report = AssemblyReport | LatticeReport | TriangleReport | FillReport
 
 __all__ = ["build_command"]
 
@@ -75,6 +78,7 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
     gyroid-cad build -o many.step --instances --cells 20 20 20 --cell-size 5 --density 0.2
     gyroid-cad build -o part.step --cells 3 3 1 --cell-size 10 --thickness "0.6 + 0.04*x"
     gyroid-cad build -o block.step --cells 5 5 5 --cell-size 7 --density 0.3 --trim box
+    gyroid-cad build -o core.step --cells 2 2 2 --cell-size 7 --thickness 0.6 --trim box --kind bodies
     gyroid-cad build -o ring.step --cells 12 2 1 --cell-size 10 --density 0.2 --map cylinder:radius=20,angle=360
     gyroid-cad build -o print.stl --cells 4 4 4 --cell-size 12 --thickness 0.8 --printer form2
     gyroid-cad build -o paper.step --cells 3 3 2 --thickness-factor "0.08 + 0.05*x" --bc-length "1 + 0.05*x" --scale 5
@@ -91,7 +95,7 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
     settings = {name: given[name] for name in (*HEADER_KEYS, "deviation", "angle", "instances", "kernel_check")}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
-        report: AssemblyReport | LatticeReport | TriangleReport
+        report: _Report
         if given["instances"]:
             report = lattice.assembly_report(progress)
         elif lattice.needs_solid(outputs):
@@ -105,9 +109,7 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
     print_made(report.rows(), summary, check, of_files, as_json, quiet)
 
 
-def _summary(
-    report: AssemblyReport | LatticeReport | TriangleReport, outputs: Sequence[str], total: float
-) -> dict[str, Any]:
+def _summary(report: _Report, outputs: Sequence[str], total: float) -> dict[str, Any]:
 
     summary = asdict(report)
     summary["seconds"] = {stage: round(value, 4) for stage, value in {**report.seconds, "total": total}.items()}

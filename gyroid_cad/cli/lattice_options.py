@@ -10,7 +10,7 @@ import click
 from gyroid_cad.cli.config import Config, printed_config, read_config
 from gyroid_cad.cli.messages import config_of, label, remember_config
 from gyroid_cad.cli.options import HEADER_KEYS, Decorator, file_paths
-from gyroid_cad.common.choices import FITS, SURFACE_NAMES, TRIMS
+from gyroid_cad.common.choices import BLOCK_KINDS, FITS, SURFACE_NAMES, TRIMS
 from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
@@ -37,7 +37,7 @@ __all__ = [
 _WALL_OPTIONS = ("thickness", "density", "porosity")
 _OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map")
 # Of a block of cells that is built. One that fills a part is placed and cut by the filling.
-_CUT_OPTIONS, _PLACE_OPTIONS = ("trim", "keep_islands"), ("origin", "rotation")
+_CUT_OPTIONS, _PLACE_OPTIONS = ("trim", "keep_islands", "kind"), ("origin", "rotation")
 PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 # Of how a command answers, not of what it makes: no keys of a file.
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
@@ -203,6 +203,15 @@ _OPTIONS = (
         help="Of a trimmed lattice: keep small pieces that the cut leaves unconnected, of less than a hundredth of "
         "what a cell holds.",
     ),
+    click.option(
+        "--kind",
+        type=click.Choice(BLOCK_KINDS),
+        metavar="KIND",
+        default=BLOCK_KINDS[0],
+        show_default=True,
+        help="Of a trimmed lattice: sheet, the wall; network-a or network-b, one of the two that it parts, of the "
+        "given density; channels, both of them without it; bodies, wall and both as solids that share their faces.",
+    ),
 )
 _outside_option = click.option(
     "--allow-outside",
@@ -272,7 +281,7 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
     place = {name: given[name] for name in _PLACE_OPTIONS if built and given[name] is not None}
     if any(given[name] is not None for name in PAPER_OPTIONS):
         own_options = (*_OWN_OPTIONS, *cut)
-        mixed = [name for name in own_options if given[name] not in (None, False)]
+        mixed = [name for name in own_options if given[name] not in (None, False, BLOCK_KINDS[0])]
         if mixed or given["thickness_factor"] is None:
             raise click.UsageError(
                 f"{listed(PAPER_OPTIONS)} are the paper's units: they need {listed(PAPER_OPTIONS[:1])}, and not "
@@ -309,7 +318,7 @@ def density_of(given: dict[str, Any]) -> Any:
     if given["porosity"] is None:
         return given["density"]
     from gyroid_cad.fields.field import as_field
-    from gyroid_cad.wall.parameters import percent_hint
+    from gyroid_cad.wall.limits import percent_hint
 
     porosity = as_field("porosity", given["porosity"], "a volume fraction")
     if not isinstance(porosity, float):

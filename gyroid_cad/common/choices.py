@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 __all__ = [
+    "BLOCK_KINDS",
     "FITS",
     "KINDS",
     "PROFILES",
@@ -43,6 +44,8 @@ Profile = Literal["default", "creo", "nx"]
 FitName = Literal["smooth", "paper"]
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
+# The bare surface of a block of cells bounds nothing.
+BLOCK_KINDS: tuple[Kind, ...] = KINDS[:-1]
 SURFACE_NAMES: tuple[SurfaceName, ...] = get_args(SurfaceName)
 TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)

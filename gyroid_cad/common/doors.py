@@ -124,6 +124,7 @@ LATTICE = (
     _row("scale field"),
     _row("map"),
     _row("trim"),
+    _row("kind"),
     _row("origin", **_but_hosts("the host places it: by workplane, `centered`, `align`, locations")),
     _row("rotation", cadquery=Absent("the workplane turns it")),
     _row("thickness factor", **_OF_PAPER),

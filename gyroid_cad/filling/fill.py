@@ -32,13 +32,13 @@ from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelFace
-from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.fitted import Closeness, valid_tolerance
+from gyroid_cad.wall.parameters import LatticeParameters
 
 __all__ = ["fill"]
 
@@ -63,7 +63,7 @@ def fill(
     core: Any = None,
     fillet: float | None = None,
     tolerance: float | None = None,
-    lattice: Lattice | None = None,
+    lattice: LatticeParameters | None = None,
     surface: SurfaceName = "gyroid",
     keep_islands: bool = False,
     solids: Sequence[str | int] = (),
@@ -90,7 +90,7 @@ def fill(
         Volume fraction instead: of the wall, or of the network, for which it is one number.
     kind : {"sheet", "network-a", "network-b", "channels", "bodies", "surface"}
         The wall; one of the two networks it parts; both of them, the wall left out; the wall, both fluids and the skin,
-        as bodies that share the faces between them; or the mid-surface alone.
+        as bodies that share the faces between them; or the mid-surface alone. A lattice may have a kind of its own.
     origin, rotation : tuple of float
         Where the lattice's origin is, in mm, and its turns about the axes x, y, z one after the other, in degrees.
         Left out, and if no lattice is given, the origin is (0, 0, 0) or a few hundredths of a cell beside, where edges
@@ -159,6 +159,7 @@ def fill(
     >>> abs(filled.report.density - 0.3) < 0.01
     True
     """
+    kind = _kind_beside(lattice, kind)
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
@@ -213,6 +214,14 @@ def fill(
     warn_of_voids(together.report.voids)
     warn_of_uncovered(together.report.uncovered)
     return together
+
+
+def _kind_beside(lattice: LatticeParameters | None, kind: Kind) -> Kind:
+    if lattice is None or lattice.kind in (SHEET, kind):
+        return kind
+    if kind != SHEET:
+        raise ParameterError("kind", kind, f"none beside a lattice whose own is {lattice.kind}")
+    return lattice.kind
 
 
 @dataclass(frozen=True, slots=True, eq=False)

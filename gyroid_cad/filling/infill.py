@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import Kind
+from gyroid_cad.common.choices import BLOCK_KINDS, Kind
 from gyroid_cad.common.progress import Timed
 from gyroid_cad.errors import ParameterError, SelfIntersectionError
 from gyroid_cad.fields.field import Field, FieldLike
 from gyroid_cad.filling.extent import BoundedExtent, MappedExtent, block_round, extent_of, preimages, uncovered
 from gyroid_cad.filling.forecast import Forecast, forecast_of, require_thicker
-from gyroid_cad.filling.wanted import SHEET, Region, Regions, regions_of
+from gyroid_cad.filling.wanted import NETWORK_A, NETWORK_B, SHEET, Region, Regions, regions_of
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.solid import build_faces, build_patches
-from gyroid_cad.lattice import Lattice
 from gyroid_cad.surface.families import MinimalSurface
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.trim.lattice_faces import LatticeFaces
@@ -37,8 +36,9 @@ from gyroid_cad.wall.distances import in_wall
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import Closeness, LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.limits import require_cell_size
 from gyroid_cad.wall.offset import Wall, side_along
-from gyroid_cad.wall.parameters import require_cell_size
+from gyroid_cad.wall.parameters import LatticeParameters
 from gyroid_cad.wall.self_intersection import require_simple
 
 __all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill"]
@@ -152,7 +152,7 @@ def described_infill(
     thickness: FieldLike | None,
     density: FieldLike | None,
     closeness: Closeness,
-    lattice: Lattice | None,
+    lattice: LatticeParameters | None,
     surface: MinimalSurface,
     partial: bool = False,
 ) -> tuple[tuple[Region, ...], float, FitSettings, Foreseen, InfillIn]:
@@ -166,12 +166,10 @@ def described_infill(
         for name, value in given.items():
             if value is not None:
                 raise ParameterError(name, value, "none beside a lattice, which has its own")
-        if kind != SHEET:
-            raise ParameterError("kind", kind, f"{SHEET}: of a block of cells only the wall is a solid of its own")
-        regions = regions_of(kind, lattice.cell_size, lattice.wall_thickness, None, lattice.minimal_surface.tube)
+        regions = _regions_beside(lattice, kind)
 
         def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:
-            return block_infill(lattice, part, frame, timed, partial)
+            return block_infill(lattice, part, frame, timed, partial, least if lattice.network else 0.0)
 
         uniform, settings = lattice.wall_thickness if lattice.uniform else 0.0, lattice.spec().settings
         own = lattice.cell_size, uniform, lattice.thickness, lattice.density
@@ -191,6 +189,21 @@ def described_infill(
     uniform = wanted.thickness if isinstance(wanted.thickness, float) else 0.0
     foreseen = partial_of(_foreseen, True, settings.control_points, size, uniform, thickness, density)
     return wanted.regions, size, settings, foreseen, endless
+
+
+def _regions_beside(lattice: LatticeParameters, kind: Kind) -> Regions:
+    """Regions of a kind, with the wall of a lattice, or with its network."""
+    if kind not in BLOCK_KINDS:
+        raise ParameterError("kind", kind, f"{' or '.join(BLOCK_KINDS)} beside a lattice, whose wall is described")
+    if kind != SHEET and not lattice.grading().cells_alike:
+        accepted = f"{SHEET}: where a map or a scale field carries the block only its wall is a solid of its own"
+        raise ParameterError("kind", kind, accepted)
+    if kind in (NETWORK_A, NETWORK_B) and not lattice.network:
+        raise ParameterError("kind", kind, "none beside a lattice of a wall: the density of a network is its own")
+    size, tube = lattice.cell_size, lattice.minimal_surface.tube
+    if lattice.network:
+        return regions_of(kind, size, None, lattice.density, tube)
+    return regions_of(kind, size, lattice.wall_thickness, None, tube)
 
 
 def _foreseen(
@@ -259,7 +272,12 @@ def endless_infill(
 
 
 def block_infill(
-    lattice: Lattice, part: Part | BoundedExtent, frame: Frame, timed: Timed, partial: bool = False
+    lattice: LatticeParameters,
+    part: Part | BoundedExtent,
+    frame: Frame,
+    timed: Timed,
+    partial: bool = False,
+    least: float = 0.0,
 ) -> Infill:
     """A lattice that was described as a block of cells, with whatever varies in it, as far as a part needs it.
 
@@ -275,6 +293,8 @@ def block_infill(
         A context for each stage, by its name.
     partial : bool
         Whether some of the part may be out of reach.
+    least : float
+        Of a uniform wall, in mm, of cells that are alike.
 
     Raises
     ------
@@ -288,7 +308,7 @@ def block_infill(
         return _mapped_infill(spec, part, frame, timed, partial)
     back = Frame(frame.own(np.zeros(3)), frame.rotation.T)
     thickness, density = (_in_frame(value, back) for value in (grading.thickness, grading.density))
-    regions = Regions((), thickness, density)
+    regions = Regions((), thickness, density).at_least(least)
     return endless_infill(
         part, frame, spec.grading.cell_size, regions, spec.settings, spec.tolerance, timed, grading.surface
     )

@@ -15,7 +15,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import THINNEST_WALL
-from gyroid_cad.wall.parameters import percent_hint, require_density, require_one, require_thickness
+from gyroid_cad.wall.limits import network_density, require_density, require_one, require_thickness
 
 __all__ = [
     "BODIES",
@@ -141,9 +141,7 @@ def regions_of(
         return Regions((Region(SURFACE, None, None, surface=True),), thickness=0.0)
     require_one(thickness, density)
     if kind in (NETWORK_A, NETWORK_B):
-        if thickness is not None:
-            raise ParameterError("thickness", thickness, "none of a network, which is told by its density")
-        return _network(kind, cell_size, density, tube)
+        return _network(kind, cell_size, network_density(density, thickness, tube), tube)
     names = ("channel-a", "channel-b") if kind == CHANNELS else (FLUID_A, FLUID_B)
     fluids = Region(names[0], 1.0, None, fluid=True), Region(names[1], None, -1.0, fluid=True)
     wall = Region(WALL if kind == BODIES else SHEET, -1.0, 1.0)
@@ -170,17 +168,8 @@ def _wall(
     return Regions(regions, density=fraction)
 
 
-def _network(kind: Kind, cell_size: float, density: FieldLike | None, tube: TubeLaw) -> Regions:
-    low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
-    meaning = "the network's volume fraction"
-    accepted = f"{meaning}, one number above {low:.5f} and below {high:.5f}"
-    fraction = as_field("density", density, meaning)
-    # Only an offset of the mid-surface that is the same everywhere bounds a network of this density.
-    if not isinstance(fraction, float):
-        raise ParameterError("density", density, accepted)
-    if not low < fraction < high:
-        raise ParameterError("density", fraction, accepted + percent_hint(fraction))
-    offset = float(tube.network_offset(fraction) * cell_size)
+def _network(kind: Kind, cell_size: float, density: float, tube: TubeLaw) -> Regions:
+    offset = float(tube.network_offset(density) * cell_size)
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)
     return Regions((region,), thickness=2 * abs(offset))

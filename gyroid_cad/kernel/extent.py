@@ -10,6 +10,7 @@ from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.GeomAbs import (
     GeomAbs_BSplineSurface,
     GeomAbs_Cone,
@@ -18,6 +19,7 @@ from OCP.GeomAbs import (
     GeomAbs_Sphere,
     GeomAbs_Torus,
 )
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 from OCP.TopAbs import TopAbs_FACE, TopAbs_VERTEX
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
@@ -26,7 +28,7 @@ from gyroid_cad.kernel.check import parts_of
 from gyroid_cad.kernel.compat import NumberedShapes, as_face, as_vertex
 from gyroid_cad.trim.box import Box
 
-__all__ = ["bounding_box", "box_of", "box_round", "corners_of", "free_form_faces"]
+__all__ = ["bounding_box", "box_of", "box_round", "corners_of", "free_form_faces", "solid_of_box"]
 
 _BOX_FACES, _BOX_CORNERS = 6, 8
 # How far from square a box may be, in radians and in parts of its largest extent.
@@ -59,6 +61,13 @@ def bounding_box(shape: TopoDS_Shape) -> NDArray[np.float64]:
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, box, False, False)
     return np.zeros((2, 3)) if box.IsVoid() else corners_of(box)
+
+
+def solid_of_box(box: Box) -> TopoDS_Shape:
+    """A box as a solid, of which :func:`box_of` finds it again."""
+    corner, x, z = box.axes @ box.low, box.axes[:, 0], box.axes[:, 2]
+    place = gp_Ax2(gp_Pnt(*corner.tolist()), gp_Dir(*z.tolist()), gp_Dir(*x.tolist()))
+    return BRepPrimAPI_MakeBox(place, *(box.high - box.low).tolist()).Solid()
 
 
 def box_of(solids: Sequence[TopoDS_Solid]) -> Box | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.choices import BLOCK_KINDS
 from gyroid_cad.common.formats import require_meshing
 from gyroid_cad.common.graph import connected
 from gyroid_cad.common.progress import Progress
@@ -102,6 +103,8 @@ def print_check(
     chosen = printer if isinstance(printer, Printer) else printer_named(printer)
     if deviation is not None:
         require_meshing(deviation)
+    if isinstance(part, Lattice) and part.kind != BLOCK_KINDS[0]:
+        part = part.filled(progress)
     if isinstance(part, Lattice):
         return _check_lattice(part, chosen, deviation, progress)
     vertices: NDArray[np.floating]

@@ -228,6 +228,12 @@ class LatticeSpec:
         """Frame that the finished wall is placed by."""
         return frame_of(self.origin, self.rotation)
 
+    def block_box(self) -> tuple[Floats, Floats]:
+        """Lowest and highest corner of the box round the block of cells, in mm."""
+        corners = np.array(list(np.ndindex(2, 2, 2))) * self.cells * self.grading.cell_size
+        placed = self.frame.placed(corners)
+        return placed.min(axis=0), placed.max(axis=0)
+
     def at_home(self) -> LatticeSpec:
         """Return the same lattice where it is fitted: unplaced, in the coordinates of its fields and maps."""
         return replace(self, origin=HOME, rotation=HOME)
@@ -274,11 +280,7 @@ class FittedWall:
 
     def bounding_box(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner of the box round the wall, or round the block it is to be cut to, in mm."""
-        if not self.spec.trimmed:
-            return self.wall.bounding_box()
-        corners = np.array(list(np.ndindex(2, 2, 2))) * self.spec.cells * self.spec.grading.cell_size
-        placed = self.spec.frame.placed(corners)
-        return placed.min(axis=0), placed.max(axis=0)
+        return self.spec.block_box() if self.spec.trimmed else self.wall.bounding_box()
 
     def at_home(self) -> FittedWall:
         """Return the wall before it was placed, to be compared with the exact surface, its fields and maps."""

@@ -13,101 +13,35 @@ from numpy.typing import ArrayLike
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number
-from gyroid_cad.common.choices import TRIMS, SurfaceName, Trim
+from gyroid_cad.common.choices import BLOCK_KINDS, TRIMS, Kind, SurfaceName, Trim
+from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.fields.makers import paper_units
 from gyroid_cad.maps.block import as_map, space_over
 from gyroid_cad.maps.space import BlockMap
-from gyroid_cad.surface.families import MinimalSurface, TubeLaw, surface_named
+from gyroid_cad.surface.families import MinimalSurface, surface_named
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.complex import build_complex
 from gyroid_cad.wall.covering import block_extent, placement
 from gyroid_cad.wall.exact import ExactMeasures, block_volume, exact_measures
-from gyroid_cad.wall.fitted import HOME, Closeness, LatticeSpec, valid_tolerance
-from gyroid_cad.wall.grading import LARGEST_CELL, SMALLEST_CELL, THINNEST_WALL, Grading
+from gyroid_cad.wall.fitted import HOME, Closeness, FittedWall, LatticeSpec, fitted_wall, valid_tolerance
+from gyroid_cad.wall.grading import Grading
+from gyroid_cad.wall.limits import (
+    NETWORK_KINDS,
+    SHEET_KIND,
+    network_density,
+    require_cell_size,
+    require_density,
+    require_one,
+    require_sheet,
+    require_thickness,
+)
+from gyroid_cad.wall.offset import Wall
 
-__all__ = [
-    "LatticeParameters",
-    "MapLike",
-    "percent_hint",
-    "require_cell_size",
-    "require_density",
-    "require_one",
-    "require_thickness",
-    "whole_cells",
-]
+__all__ = ["LatticeParameters", "MapLike", "whole_cells"]
 
 MOST_CELLS_ALONG = 1_000_000
-
-
-def require_cell_size(cell_size: float) -> None:
-    """Refuse cells too small or too large for the kernel.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not SMALLEST_CELL <= cell_size <= LARGEST_CELL:
-        raise ParameterError("cell_size", cell_size, f"{SMALLEST_CELL:g} to {LARGEST_CELL:g} mm")
-
-
-def require_thickness(thickness: float, cell_size: float, tube: TubeLaw) -> None:
-    """Refuse a constant wall, in mm, that is thinner than the kernel bears or past the curvature limit.
-
-    Raises
-    ------
-    ParameterError
-    """
-    limit = tube.max_thickness * cell_size
-    if not THINNEST_WALL <= thickness < limit:
-        raise ParameterError(
-            "thickness",
-            thickness,
-            f"{THINNEST_WALL:g} mm or more and below {limit:.5g} mm, "
-            f"the curvature limit {tube.max_thickness:.5f} x cell_size",
-        )
-
-
-def require_density(density: float, cell_size: float, tube: TubeLaw) -> None:
-    """Refuse a constant volume fraction whose wall is thinner than the kernel bears or past the curvature limit.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if not 0 < density < tube.max_density:
-        accepted = f"above 0 and below {tube.max_density:.5f}, where the wall meets itself"
-        raise ParameterError("density", density, accepted + percent_hint(density))
-    if tube.thickness(density) * cell_size < THINNEST_WALL:
-        min_thickness = tube.density(THINNEST_WALL / cell_size)
-        raise ParameterError("density", density, f"at least {min_thickness:.3g} (a wall of {THINNEST_WALL} mm)")
-
-
-def percent_hint(fraction: float) -> str:
-    """Return what a fraction given in percent would be, to be added to an error; nothing of what is no percentage.
-
-    Examples
-    --------
-    >>> percent_hint(30.0)
-    '; 30 % is 0.30'
-    """
-    if not 1 < fraction <= 100:
-        return ""
-    two, four = f"{fraction / 100:.2f}", f"{fraction / 100:.4g}"
-    return f"; {fraction:g} % is {two if float(two) == float(four) else four}"
-
-
-def require_one(thickness: object, density: object) -> None:
-    """Refuse both or neither of thickness and density.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if (thickness is None) == (density is None):
-        given = {"thickness": thickness, "density": density}
-        raise ParameterError("thickness, density", given, "exactly one of the two")
 
 
 def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:
@@ -155,6 +89,7 @@ class LatticeParameters:
     origin: Point = HOME
     rotation: Point = HOME
     compact: float | None = None
+    kind: Kind = SHEET_KIND
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
@@ -163,6 +98,7 @@ class LatticeParameters:
         )
         require_cell_size(self.cell_size)
         require_one(self.thickness, self.density)
+        self._require_kind()
         for name, meaning in _FIELDS.items():
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, as_field(name, getattr(self, name), meaning))
@@ -177,7 +113,7 @@ class LatticeParameters:
             self._require_variable()
         elif self.density is None:
             require_thickness(self.wall_thickness, self.cell_size, self.minimal_surface.tube)
-        else:
+        elif not self.network:
             require_density(self.volume_fraction, self.cell_size, self.minimal_surface.tube)
 
     @classmethod
@@ -257,8 +193,21 @@ class LatticeParameters:
         return not varying and self.scale_field is None and self.map is None
 
     @property
+    def network(self) -> bool:
+        """True of one of the two networks that the surface parts.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, density=0.3, trim="box", kind="network-a").network
+        True
+        """
+        return self.kind in NETWORK_KINDS
+
+    @property
     def wall_thickness(self) -> float:
         """The whole wall in mm, whichever of thickness and density was given; its mean where the lattice is graded.
+
+        Of a network that which both of the surface's networks of its density, or of the rest, would leave between them.
 
         Examples
         --------
@@ -267,6 +216,8 @@ class LatticeParameters:
         """
         if not self.uniform:
             return self._measures().mean_thickness
+        if self.network:
+            return 2 * abs(self.minimal_surface.tube.network_offset(self.density)) * self.cell_size  # type: ignore[arg-type]
         if self.density is None:
             return float(self.thickness)  # type: ignore[arg-type]
         return self.minimal_surface.tube.thickness(self.density) * self.cell_size  # type: ignore[arg-type]
@@ -336,6 +287,58 @@ class LatticeParameters:
             None if self.trim is None else block_extent(self.cells, self.cell_size),
         )
 
+    def fitted(self, progress: Progress | None = None) -> FittedWall:
+        """The wall behind everything else, with its complex and what the fit is worth; no kernel is asked.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).fitted().min_thickness
+        0.8
+        """
+        require_sheet(self.kind)
+        return fitted_wall(self.spec(), progress)
+
+    def wall(self) -> Wall:
+        """Control nets of the wall's faces, in mm, and the cell complex they belong to.
+
+        Raises
+        ------
+        FitError
+            If the fit's edges do not meet those of its neighbours.
+
+        Examples
+        --------
+        >>> wall = Lattice((1, 1, 1), 10, thickness=0.8).wall()
+        >>> wall.complex.patch_count, wall.face(0, side=1).evaluate(0.0, 0.0).shape
+        (24, (3,))
+        """
+        return self.fitted().wall
+
+    def bounding_box(self) -> tuple[Point, Point]:
+        """Lowest and highest corner of the box round the wall, or round the block it is cut to, in mm.
+
+        Examples
+        --------
+        >>> low, high = Lattice((1, 1, 1), 10, thickness=0.8).bounding_box()
+        >>> [round(x, 2) for x in low], [round(x, 2) for x in high]
+        ([-2.73, -2.73, -2.73], [12.73, 12.73, 12.73])
+        """
+        # Of a block that is cut nothing needs to be fitted.
+        box = self.spec().block_box() if self.trim else self.fitted().bounding_box()
+        low, high = (corner.tolist() for corner in box)
+        return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+    def deviation(self, given: float | None = None) -> float:
+        """Return the largest distance of triangles from the faces, in mm: the usual one if none is given.
+
+        Examples
+        --------
+        >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
+        >>> lattice.deviation(), lattice.deviation(0.2)
+        (0.01, 0.2)
+        """
+        return min(self.cell_size / 1000, self.fitted().min_thickness / 10) if given is None else given
+
     def _measures(self) -> ExactMeasures:
         return _measures(self.cells, self.grading())
 
@@ -348,6 +351,15 @@ class LatticeParameters:
             require_density(self.density, self.cell_size, self.minimal_surface.tube)
         if self.scale_field is not None and any(self.grading().map_closes):
             raise ParameterError("scale_field", self.scale_field, f"none where {self.map} joins the block's ends")
+
+    def _require_kind(self) -> None:
+        if self.kind not in BLOCK_KINDS:
+            raise ParameterError("kind", self.kind, " or ".join(BLOCK_KINDS))
+        if self.kind != SHEET_KIND and self.trim is None:
+            accepted = f"{SHEET_KIND}, unless trim is box: whole patches end in walls that close the {SHEET_KIND} alone"
+            raise ParameterError("kind", self.kind, accepted)
+        if self.network:
+            network_density(self.density, self.thickness, self.minimal_surface.tube)
 
     def _require_trim(self) -> None:
         if self.trim is not None and self.trim not in TRIMS:

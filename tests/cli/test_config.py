@@ -149,6 +149,6 @@ def test_a_parameter_of_python_is_known_by_its_key(tmp_path: Path) -> None:
 
 
 def test_a_key_of_another_command_is_said_to_be_that(tmp_path: Path) -> None:
-    (tmp_path / "fill.toml").write_text('kind = "sheet"')
-    with pytest.raises(ParameterError, match="kind is one of gyroid-cad fill"):
+    (tmp_path / "fill.toml").write_text("skin = 0.5")
+    with pytest.raises(ParameterError, match="skin is one of gyroid-cad fill"):
         read_config(str(tmp_path / "fill.toml"), ["cells", "keep_islands"])

@@ -28,8 +28,8 @@ from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings, fit_patch
 from gyroid_cad.surface.symmetry import CELL_QUARTERS
 from gyroid_cad.wall.complex import build_complex
+from gyroid_cad.wall.grading import LARGEST_CELL, SMALLEST_CELL
 from gyroid_cad.wall.offset import build_wall
-from gyroid_cad.wall.parameters import LARGEST_CELL, SMALLEST_CELL
 
 DiskFull = Callable[[int], AbstractContextManager[None]]
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gyroid_cad.common.arrays import grouped
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.nurbs.surface import face_densities, face_integrals
 
@@ -75,9 +76,14 @@ class SquareQuadrature:
         whole = np.einsum("sp,sptqk->stqk", self.weights.reshape(spans, -1), blocks)
         before = np.cumsum(whole, axis=0) - whole
         (span_u, _, up_to), (span_v, at, _) = (self._functions(x) for x in places.T)
-        # A place takes from one span along v: small products, where those of full matrices would be mostly of zeros.
-        along_u = before[span_u, span_v] + np.einsum("mp,mpqk->mqk", up_to, blocks[span_u, :, span_v])
-        return np.asarray(np.einsum("m,mq,mqk->mk", rates, at, along_u))
+        at *= rates[:, np.newaxis]
+        found = np.zeros((len(places), density.shape[-1]))
+        # Places of one span along both are taken together: a product of small matrices.
+        for block, some in grouped(span_u * spans + span_v):
+            u, v = divmod(block, spans)
+            along_u = up_to[some] @ blocks[u, :, v].reshape(_PER_SPAN, -1) + before[u, v].ravel()
+            found[some] = np.einsum("mq,mqk->mk", at[some], along_u.reshape(len(some), _PER_SPAN, -1))
+        return found
 
     def _functions(self, x: Floats) -> tuple[Integers, Floats, Floats]:
         """Span of each x; there Lagrange's polynomials on its nodes, and their integrals from its start to x."""

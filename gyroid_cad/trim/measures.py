@@ -30,8 +30,6 @@ Booleans = NDArray[np.bool_]
 _PER_STRETCH, _PER_RIM_SPAN, _PART_PIECES = 3, 5, 64
 # Of a face of the part that is no plane, along each parameter.
 _SPANS, _MOST_SPANS = 12, 40
-# So many places at a time.
-_AT_ONCE = 2**12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,8 +83,7 @@ def lattice_measures(cut: Crossing, middle: Floats) -> PieceMeasures:
     # Places come in the order of their nets, so that the samples of one are held at a time.
     for net, some in grouped(of_piece.ravel()[piece]):
         density = quadrature.densities(wall.nets_of(*nets[net, :, np.newaxis]), wall.weights, moments=True)[0]
-        for rows in np.split(some, range(_AT_ONCE, len(some), _AT_ONCE)):
-            np.add.at(sums, piece[rows], quadrature.shares(places[rows], rates[rows], density))
+        np.add.at(sums, piece[some], quadrature.shares(places[some], rates[some], density))
     shift = wall.shifts[wall.patch_shift[faces.patch[face]]] - middle
     return _placed(sums, shift, cut.backwards[face])
 
@@ -186,13 +183,11 @@ def _border(cut: Crossing, piece: CutLoops, stretch: Callable[[CutEdge, bool], S
 def boundary_measures(cut: Crossing, pieces: list[CutLoops], middle: Floats) -> PieceMeasures:
     """Measure pieces of the part's faces."""
     totals = np.zeros((len(pieces), 5))
-    samples: tuple[int, _Samples] | None = None
-    for index in sorted(range(len(pieces)), key=lambda k: pieces[k].face):
-        face = cut.boundary.faces[pieces[index].face]
-        if samples is None or samples[0] != pieces[index].face:
-            samples = pieces[index].face, _Samples(face, middle)
-        places, rates = _part_border(cut, pieces[index])
-        totals[index] = samples[1].over(places, rates)
+    for face, some in grouped(np.array([piece.face for piece in pieces], dtype=np.int64)):
+        samples = _Samples(cut.boundary.faces[face], middle)
+        borders = [_part_border(cut, pieces[index]) for index in some.tolist()]
+        places, rates = (np.concatenate(parts) for parts in zip(*borders, strict=True))
+        np.add.at(totals, np.repeat(some, [len(own) for _, own in borders]), samples.shares(places, rates))
     sign = np.array([cut.boundary.faces[piece.face].sign for piece in pieces], dtype=np.float64)
     return PieceMeasures(sign * totals[:, 0], totals[:, 1], sign[:, np.newaxis] * totals[:, 2:])
 
@@ -226,9 +221,9 @@ class _Samples:
         inner = np.unique(knots[(knots > -1 + 1e-4) & (knots < 1 - 1e-4)])
         return np.concatenate([[-1.0], inner if len(inner) < _MOST_SPANS else np.linspace(-1, 1, 25)[1:-1], [1.0]])
 
-    def over(self, places: Floats, rates: Floats) -> Floats:
+    def shares(self, places: Floats, rates: Floats) -> Floats:
         square = np.clip((places - self.low) / self.scale - 1, -1, 1)
-        return self.quadrature.over(square, rates / self.scale[1], self.density)
+        return self.quadrature.shares(square, rates / self.scale[1], self.density)
 
 
 @lru_cache(maxsize=8)

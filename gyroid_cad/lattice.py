@@ -154,7 +154,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> list(made.domains), round(sum(made.report.volumes.values()), 6)
         (['wall', 'fluid-a', 'fluid-b'], 1000.0)
         """
-        from gyroid_cad.filling.block import filled_block
+        from gyroid_cad.filling.fill import filled_block
 
         return filled_block(self, progress)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.cache import Cache
 from gyroid_cad.common.choices import Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.bodies import Made, mouths_of
+from gyroid_cad.filling.bodies import Made, mouths_of, with_own_names
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
@@ -29,21 +30,27 @@ from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
 from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
 from gyroid_cad.kernel.check import compound_of, topology
+from gyroid_cad.kernel.depth import NamedFaces
+from gyroid_cad.kernel.extent import solid_of_box
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelFace
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.box import Box
 from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.fitted import Closeness, valid_tolerance
 from gyroid_cad.wall.parameters import LatticeParameters
 
-__all__ = ["fill"]
+__all__ = ["fill", "filled_block"]
 
 Floats = NDArray[np.float64]
+
+# Blocks that were filled last.
+_blocks: Cache[Hashable, Filled] = Cache()
 
 
 def fill(
@@ -221,6 +228,30 @@ def fill(
     return together
 
 
+def filled_block(lattice: LatticeParameters, progress: Progress | None = None) -> Filled:
+    """The block of cells of a lattice as the box that it is, filled with the lattice; the last few are remembered.
+
+    Parameters
+    ----------
+    lattice : LatticeParameters
+        Trimmed.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    ParameterError, SelfIntersectionError, FitError, KernelError
+    """
+
+    def made() -> Filled:
+        axes, origin = lattice.spec().frame.rotation, lattice.spec().frame.origin
+        low = origin @ axes
+        box = Box(axes, low, low + np.array(lattice.cells) * lattice.cell_size)
+        return fill(solid_of_box(box), lattice=lattice, keep_islands=lattice.keep_islands, progress=progress)
+
+    return _blocks.get((lattice.spec(), lattice.kind, lattice.density), made)
+
+
 def _kind_beside(lattice: LatticeParameters | None, kind: Kind) -> Kind:
     if lattice is None or lattice.kind in (SHEET, kind):
         return kind
@@ -346,7 +377,10 @@ def _reported(
         fluids=reports,
     )
     sizes = {name: tuple(made.size for made in some) for name, some in domains.items()}
-    face_names = {name: tuple(called for made in some for called in made.face_names) for name, some in domains.items()}
+    own = NamedFaces(filling.part.named_faces)
+    face_names = {
+        name: tuple(called for made in some for called in with_own_names(made, own)) for name, some in domains.items()
+    }
     return Filled(shapes, report, sizes, face_names)
 
 

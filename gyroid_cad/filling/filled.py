@@ -28,8 +28,8 @@ from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import KernelShape, another_handle
 from gyroid_cad.kernel.stl import shared_triangles
-from gyroid_cad.mesh.triangles.regions import region_name, write_regions
 from gyroid_cad.mesh.triangles.stl import require_near_origin
+from gyroid_cad.mesh.triangles.writing import region_name, write_regions
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.step.header import StepHeader

@@ -333,8 +333,8 @@ class _Fluid:
         ]
         return [*(as_face(face.Reversed()) for face in (*pieces.inside, *self.crossed.faces)), *ends]
 
-    def name_of(self, face: KernelShape) -> str | None:
-        """Name of a face that was made for this fluid."""
+    def name_of(self, face: KernelShape, body: str) -> str | None:
+        """Name that a face which was made for this fluid has on a body: chips have gone from one to another."""
         if self._lattice.Contains(face):
             return f"{WALL}/{self.name[-1]}"
         number = int(self._boundary.FindIndex(face)) - 1
@@ -343,9 +343,12 @@ class _Fluid:
         origin = self.crossed.pieces.origins[number]
         if not self.hollow.opened[origin]:
             return f"{SKIN}/{self.name[-1]}"
-        return f"{self.name[-1]}:{sum(self.hollow.opened[: origin + 1])}" if self.inner[number] else f"{SKIN}/outside"
+        return f"{SKIN}/outside" if body == WALL else f"{self.name[-1]}:{sum(self.hollow.opened[: origin + 1])}"
 
 
 def _name_of(face: KernelShape, made: dict[str, _Fluid], body: str) -> str:
-    found = (fluid.name_of(face) for fluid in made.values())
-    return next(filter(None, found), f"{SKIN}/outside")
+    for fluid in made.values():
+        name = fluid.name_of(face, body)
+        if name is not None:
+            return name
+    return f"{SKIN}/outside"

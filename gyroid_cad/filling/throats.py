@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from gyroid_cad.filling.infill import Infill
 from gyroid_cad.filling.wanted import Region
@@ -30,7 +31,7 @@ Booleans = NDArray[np.bool_]
 # Nodes along a cell, the most that keep their number; throats lie in eighths of the cell.
 _ALONG, _MOST_NODES = (32, 16, 8), 250_000
 # Of the points that stand for faces, in steps of the grid; and how near to an opening's a node lies at it.
-_SPREAD, _AT_OPENING = 0.5, 1.2
+_SPREAD, _AT_OPENING = 0.75, 1.2
 # A throat that agrees so closely with the lattice's own, in cell sizes, is that: distances are known no closer.
 _SAME_THROAT = 2e-3
 
@@ -99,7 +100,11 @@ def narrowest_throat(filling: InCore, infill: Infill, region: Region) -> float:
     within = within[filling.core.contains(places[within])]
     closed, openings = _surface_points(hollow, filling.core, _SPREAD * grid.step)
     free, at = np.zeros(len(room)), []
-    free[within] = np.minimum(room[within], tree_of(closed).query(places[within])[0]) if len(closed) else room[within]
+    free[within] = room[within]
+    if len(closed):
+        # Faces further off than any wall need not be found.
+        far = tree_of(closed).query(places[within], distance_upper_bound=float(room.max()))[0]
+        free[within] = np.minimum(free[within], far)
     for points in openings:
         near = tree_of(points).query(places[within], distance_upper_bound=_AT_OPENING * grid.step)[0]
         at.append(within[np.isfinite(near)])
@@ -161,8 +166,6 @@ def _surface_points(hollow: Hollow, core: Part, spacing: float) -> tuple[Floats,
 
 def _passing(free: Floats, openings: list[Integers]) -> float:
     """Radius of the largest sphere that passes between all openings, each given by the nodes at it."""
-    from scipy.ndimage import label
-
     most = min((float(free.ravel()[nodes].max(initial=0.0)) for nodes in openings), default=0.0)
     values = np.unique(free[(free > 0) & (free <= most)])
     low, high = -1, len(values)

@@ -14,8 +14,11 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling import throats
 from gyroid_cad.filling.fill import fill
 from gyroid_cad.filling.filled import Filled
+from gyroid_cad.kernel import apart
 from gyroid_cad.kernel.assembly import read_bodies
 from gyroid_cad.kernel.check import is_valid, parts_of, topology
+from gyroid_cad.kernel.step import write_step
+from gyroid_cad.step.products import BodyLabels
 from gyroid_cad.surface.families import USUAL
 from gyroid_cad.surface.fit import FitSettings
 from gyroid_cad.wall.covering import frame_of, periodic_offsets
@@ -28,7 +31,7 @@ def ball() -> cq.Workplane:
     return cq.Workplane().sphere(4.5)
 
 
-def bodies_of(part: cq.Workplane, **given: object) -> Filled:
+def bodies_of(part: cq.Workplane | str, **given: object) -> Filled:
     return fill(part, CELL, density=0.3, kind="bodies", fit=FIT, **given)
 
 
@@ -184,6 +187,28 @@ def test_a_fluid_with_one_opening_is_a_dead_end() -> None:
     made = bodies_of(cq.Workplane().box(6, 5, 5), skin=0.7, openings=["a:<X", "b:>X"])
     assert [fluid.dead_ends for fluid in made.report.fluids] == [fluid.pieces for fluid in made.report.fluids]
     assert "dead end" in str(made.report)
+
+
+def test_faces_that_the_parts_file_names_keep_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apart, "read_apart", lambda path, reader: reader(str(path)))
+    part, path = cq.Workplane().box(9, 8, 6), tmp_path / "named.step"
+    names = ["inlet", "outlet", "north", "", "NONE", "bottom"]
+    write_step(part.val().wrapped, path, labels=BodyLabels(face_names=names))
+    made = bodies_of(str(path), skin=0.7, openings=["a:<X", "a:>X", "b:<Y", "b:>Y"])
+    assert {called for called in made.face_names["fluid-a"] if ":" in called} == {"a:inlet", "a:outlet"}
+    assert {called for called in made.face_names["fluid-b"] if ":" in called} == {"b:north", "b:2"}
+    outside = {called for called in made.face_names["wall"] if called[:5] not in ("wall/", "skin/a", "skin/b")}
+    assert outside - {"skin/a", "skin/b"} == {
+        *("skin/inlet", "skin/outlet", "skin/north", "skin/bottom"),
+        # What has no name of its own.
+        "skin/outside",
+    }
+    for name, shape in made.domains.items():
+        for face, called in zip(parts_of(shape, TopAbs_FACE), made.face_names[name], strict=True):
+            if called.endswith("inlet"):
+                assert cq.Face(face).BoundingBox().xmax == pytest.approx(-4.5, abs=1e-6)
+    # Mouths are counted as before.
+    assert [fluid.dead_ends for fluid in made.report.fluids] == [0, 0]
 
 
 @pytest.mark.parametrize(

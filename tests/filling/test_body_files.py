@@ -14,7 +14,7 @@ from gyroid_cad.kernel.check import faces_of
 from gyroid_cad.lattice import Lattice
 from gyroid_cad.mesh.triangles.files import numbered_corners, read_triangles
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
-from gyroid_cad.mesh.triangles.regions import read_regions
+from gyroid_cad.mesh.triangles.writing import read_regions
 from gyroid_cad.surface.fit import FitSettings
 
 CELL = 6.0

@@ -120,7 +120,8 @@ def fill(
         the faces furthest that way, or points (x, y, z), each for the face next to it. Of bodies each may name the
         fluid it is for, as in "a:>Z" or ("a", face): the channels of the other end at the skin there.
     plug : float, optional
-        Thickness in mm of the wall at which they end there, from the skin's, which it is if left out, to a cell's size.
+        Thickness in mm of the wall at which they end there, from the skin's, which it is if left out, to a cell's size;
+        more than the skin's where faces are flat.
     core : shape, Workplane or path-like, optional
         Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
         core, open wherever the core comes to the part's boundary.

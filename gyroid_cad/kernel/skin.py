@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
@@ -25,7 +26,7 @@ from gyroid_cad.kernel.check import compound_of, faces_of, is_valid, measure, pa
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
-from gyroid_cad.kernel.offset import core_of
+from gyroid_cad.kernel.offset import core_of, flat_normal
 from gyroid_cad.kernel.part import Part, require_part, selected_faces
 from gyroid_cad.kernel.shells import VolumeOf, solids_of
 from gyroid_cad.kernel.sieve import with_changes
@@ -146,7 +147,7 @@ def hollow(
     openings : sequence of TopoDS_Shape
         Faces, as of :func:`openings_of`, at which the core comes to the surface, but for a rim as wide as the skin.
     plugged : sequence of TopoDS_Face
-        Others of the part's faces, below which the skin is thicker.
+        Others of the part's faces, flat ones, below which the skin is thicker.
     plug : float, optional
         Its thickness there, in mm.
 
@@ -174,30 +175,26 @@ def hollow(
         for core in core_of(solid, faces, skin, depth)
     ]
     if plug is not None and plug > skin:
-        cores = _below_plugs(part, cores, plugged, plug)
+        cores = _below_plugs(cores, plugged, plug)
     core = require_part(compound_of(cores))
     if opened:
         return _sharing(part, core, opened, skin)
     return Hollow(tuple(faces_of(part.shape)), core, len(faces_of(core.shape)) * (False,), skin)
 
 
-def _below_plugs(
-    part: Part, cores: Sequence[TopoDS_Solid], plugged: Sequence[TopoDS_Face], plug: float
-) -> list[TopoDS_Solid]:
-    """Cores less what lies above plugs: whatever is not as deep as they are below the faces that have them."""
-    deeper: list[TopoDS_Solid] = []
-    for solid in part.solids:
-        others = [face for face in faces_of(solid) if not any(face.IsSame(other) for other in plugged)]
-        depths = Depths(solid, others)
-        deepest, place = depths.deepest(plug) if depths.kept else (plug, np.zeros(3))
-        if depths.kept and deepest <= plug:
-            raise ParameterError("plug", plug, f"less than about {deepest:.3g} mm, round {shown_place(place)}")
-        deeper += core_of(solid, others, plug, depths) if depths.kept else [solid]
-    common = BRepAlgoAPI_Common(compound_of(cores), compound_of(deeper)).Shape()
-    left = [as_solid(solid) for solid in parts_of(common, TopAbs_SOLID)]
-    if not left:
+def _below_plugs(cores: Sequence[TopoDS_Solid], plugged: Sequence[TopoDS_Face], plug: float) -> list[TopoDS_Solid]:
+    """Cores less what lies straight below the faces that have plugs."""
+    left: TopoDS_Shape = compound_of(cores)
+    for face in plugged:
+        outwards = flat_normal(face)
+        if outwards is None:
+            raise ParameterError("plug", plug, "none, for the skin is all that closes channels at a face that is bent")
+        slab = BRepPrimAPI_MakePrism(face, outwards * -plug).Shape()
+        left = BRepAlgoAPI_Cut(left, slab).Shape()
+    solids = [as_solid(solid) for solid in parts_of(left, TopAbs_SOLID)]
+    if not solids:
         raise ParameterError("plug", plug, "less: it leaves nothing of the core")
-    return left
+    return solids
 
 
 def hollow_round(part: Part, core: Part) -> Hollow:

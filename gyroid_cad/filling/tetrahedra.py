@@ -44,8 +44,8 @@ _FINER = 0.5
 # The smallest mean ratio that needs no second try.
 _FAIR = 0.15
 # Of the volume of each region with sides that follow the faces as quadratic ones do; or, of coarse elements, in parts
-# of what straight sides miss.
-_AGREEMENT, _OF_STRAIGHT = 1e-3, 0.3
+# of what moves as straight sides are bent.
+_AGREEMENT, _OF_MOVED = 1e-3, 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,9 +225,10 @@ def _best(surface: _Surface, size: float, order: int) -> tuple[SurfaceMesh, Volu
 
 def _disagreement(straight: Volume, curved: Volume, exact: Floats) -> str:
     """Message of what is amiss with the regions' volumes, or nothing."""
-    straight_off, off = (
-        np.abs(np.bincount(one.regions, cell_volumes(one.points, one.cells), len(exact) + 1)[1:] / exact - 1)
-        for one in (straight, curved)
+    before, after = (cell_volumes(one.points, one.cells) for one in (straight, curved))
+    found, moved = (
+        np.bincount(curved.regions, some, len(exact) + 1)[1:] / exact for some in (after, np.abs(after - before))
     )
-    agree = off <= np.maximum(_AGREEMENT, _OF_STRAIGHT * straight_off)
+    off = np.abs(found - 1)
+    agree = off <= np.maximum(_AGREEMENT, _OF_MOVED * moved)
     return "" if agree.all() else f"a region's volume is off by {off[~agree].max():.1e}"

@@ -30,7 +30,7 @@ from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import KernelShape, another_handle
-from gyroid_cad.kernel.stl import shared_triangles
+from gyroid_cad.kernel.stl import triangles_of_bodies
 from gyroid_cad.mesh.finite_elements.files import require_mesh_format
 from gyroid_cad.mesh.tetrahedra.data import TetrahedralMesh
 from gyroid_cad.mesh.triangles.stl import require_near_origin
@@ -261,7 +261,7 @@ class Filled(HostShapes):
             self.mesh(element_size, elements_through, order, progress).write(*meshes, progress=progress)
 
     def _write_regions(self, path: Path, body: BodyName, deviation: float, angle: float) -> None:
-        made = shared_triangles(self.domains.values(), path, deviation, angle)
+        made = triangles_of_bodies(self.domains.values(), path, deviation, angle)
         names = [name for domain in self.domains for name in self.face_names[domain]]
         domains = [domain for domain in self.domains for _ in self.face_names[domain]]
         wanted = [use for use, domain in enumerate(domains) if body in (_ALL, domain)]

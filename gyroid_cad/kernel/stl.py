@@ -37,13 +37,13 @@ from gyroid_cad.mesh.triangles.storing import storable_triangles
 from gyroid_cad.mesh.triangles.writing import write_triangles
 
 __all__ = [
-    "SharedTriangles",
+    "BodyTriangles",
     "closed_triangles",
     "diagonal",
     "meshed",
     "meshed_by_face",
-    "shared_triangles",
     "solid_triangles",
+    "triangles_of_bodies",
     "write_meshed_stl",
 ]
 
@@ -185,7 +185,7 @@ def solid_triangles(shape: TopoDS_Shape, deviation: float) -> list[tuple[Floats,
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SharedTriangles:
+class BodyTriangles:
     """Triangles of bodies that share faces: of each face once.
 
     Attributes
@@ -225,9 +225,9 @@ class SharedTriangles:
         return np.concatenate(made), np.concatenate(numbers)
 
 
-def shared_triangles(
+def triangles_of_bodies(
     bodies: Iterable[TopoDS_Shape], path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
-) -> SharedTriangles:
+) -> BodyTriangles:
     """Triangles of bodies that share faces and edges, so that they close each of the bodies.
 
     Parameters
@@ -256,7 +256,7 @@ def shared_triangles(
         ends.append(len(uses))
     own = [range(*some) for some in pairwise(ends)]
     for meshed_faces in _ways_to_mesh(faces, path, deviation, angle):
-        made = SharedTriangles(*meshed_faces, tuple(uses))
+        made = BodyTriangles(*meshed_faces, tuple(uses))
         if not any(unmatched_edges(made.of(some)[0]) for some in own):
             return made
     left_open = next(triangles for some in own if unmatched_edges(triangles := made.of(some)[0]))

@@ -147,6 +147,12 @@ def sized(made: Made, usual: Made) -> bool:
     return 0 < made.triangles < 4000
 
 
+def nodes_of(made: Made) -> int:
+    """Nodes of an Abaqus file of tetrahedra."""
+    before, elements = made.file.read_text().split("*ELEMENT, TYPE=C3D4, ELSET=sheet")
+    return len(before.split("NSET=ALL_NODES")[1].split()) if elements else 0
+
+
 USUAL: dict[str, Given] = {
     "build": {"cells": (1, 1, 1), "cell size": 10, "thickness": 0.8, "control points": 4},
     "fill": {"part": block_at(0), "cell size": CELL, "density": 0.2, "control points": 4},
@@ -319,6 +325,13 @@ CASES: dict[str, dict[str, Case]] = {
         "thickness factor": Case({"cells": (1, 1, 1), "thickness factor": 0.2, "scale": 4}, grown, PAPER),
         "bc length": Case({"cells": (1, 1, 1), "thickness factor": 0.2, "bc length": 3.6}, smaller, PAPER),
         "scale": Case({"cells": (1, 1, 1), "thickness factor": 0.1, "scale": 4}, smaller, PAPER),
+        "element size": Case({"file": "made.inp", "element size": 2.0}, lambda made, usual: 5 < nodes_of(made) < 1500),
+        "elements through": Case(
+            {"file": "made.inp", "elements through": 1}, lambda made, usual: 5 < nodes_of(made) < 1500
+        ),
+        "order": Case(
+            {"file": "made.inp", "element size": 2.0, "order": 2}, lambda made, usual: "C3D10" in made.file.read_text()
+        ),
         "combination": Case({"combination": bd.Mode.PRIVATE}, lambda made, usual: near(made.volume, usual.volume)),
     },
 }

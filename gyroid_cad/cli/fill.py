@@ -29,6 +29,7 @@ from gyroid_cad.cli.options import (
     deviation_option,
     file_paths,
     json_option,
+    one_of,
     output_option,
     printer_option,
     quiet_option,
@@ -38,6 +39,7 @@ from gyroid_cad.cli.print_check import check_by
 from gyroid_cad.common.choices import KINDS, ROUTES, Route
 from gyroid_cad.common.files import file_sizes
 from gyroid_cad.common.formats import (
+    MESH_FORMATS,
     PART_FORMATS,
     TOML,
     TRIANGLE_FORMATS,
@@ -83,7 +85,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     callback=_take_files,
     shell_complete=file_paths,
 )
-@output_option(f"{listed_endings(PART_FORMATS)}; may be repeated.")
+@output_option(f"{listed_endings(PART_FORMATS + MESH_FORMATS)}; may be repeated.")
 @infill_options
 @click.option(
     "--cells",
@@ -143,6 +145,22 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @author_options
 @deviation_option
 @angle_option
+@click.option("--element-size", type=float, metavar="MM", help="Length of the edges of tetrahedra, in files of meshes.")
+@click.option(
+    "--elements-through",
+    type=float,
+    metavar="N",
+    help="Instead, how many tetrahedra there are through the wall, about; 2 if neither is given.",
+)
+@click.option(
+    "--order",
+    type=int,
+    default=1,
+    show_default=True,
+    metavar="1|2",
+    shell_complete=one_of("1", "2"),
+    help="Tetrahedra of 4 nodes, or of 10 that follow the faces.",
+)
 @check_option
 @printer_option("Check as well whether it can make this, such as form2.")
 @click.option("--print-config", is_flag=True, help="Print all of this as TOML, ready for FILL.toml; fill nothing.")
@@ -167,6 +185,7 @@ def fill_command(
     gyroid-cad fill part.step -o light.step --cell-size 7 --density 0.30 --core inner.step
     gyroid-cad fill machine.step -o light.step --cell-size 7 --density 0.30 --solid bracket
     gyroid-cad fill part.step -o fluids.step --cell-size 7 --thickness 0.6 --kind channels
+    gyroid-cad fill part.step -o bodies.msh --cell-size 7 --thickness 0.6 --kind bodies --elements-through 3
     gyroid-cad fill scan.stl -o light.3mf --cell-size 7 --density 0.30
     gyroid-cad fill part.step -o core.step --cells 3 3 3 --cell-size 7 --density 0.3 --map twist:angle=20
     gyroid-cad fill fill.toml
@@ -174,7 +193,7 @@ def fill_command(
     """
     start = time.perf_counter()
     require_libraries()
-    from gyroid_cad.filling.fill import fill
+    from gyroid_cad.filling import fill, tetrahedra
 
     if part is None:
         raise click.UsageError("Missing argument 'PART.step': a file, or the key part of FILL.toml.")
@@ -189,6 +208,9 @@ def fill_command(
     header, limits = ({name: given[name] for name in names} for names in (HEADER_KEYS, ("deviation", "angle")))
     StepHeader(**header)
     require_settings((1, 1, 1), **limits)
+    elements = {name: given[name] for name in ("element_size", "elements_through", "order")}
+    meshes = [path for path in output if format_of(path) in MESH_FORMATS]
+    tetrahedra.require_elements(**elements, wanted=bool(meshes))
     written = {**header, **limits}
     checked = None if printer is None else check_by(printer)
     settings["route"] = _route(part, given, output)
@@ -196,16 +218,23 @@ def fill_command(
         settings["deviation"], written = given["deviation"], {}
     with shown_progress(not quiet, lines=True) as progress:
         try:
-            filled = fill(part, progress=progress, **settings)
+            filled = fill.fill(part, progress=progress, **settings)
         except KernelError as failed:
             raise KernelError(str(failed).replace('route="triangles"', "--route triangles")) from failed
-        filled.write(*output, **written, progress=progress)
+        if others := [path for path in output if path not in meshes]:
+            filled.write(*others, **written, progress=progress)
+        mesh = filled.mesh(**elements, progress=progress) if meshes else None
+        if mesh is not None:
+            mesh.write(*meshes, progress=progress)
         check = None if checked is None else checked(filled, given["deviation"], progress)
-        of_files = checked_files(output if given["check"] else (), progress)
+        of_files = checked_files(others if given["check"] else (), progress)
     summary = filled.report.as_dict()
     summary["seconds"] = {**summary["seconds"], "total": time.perf_counter() - start}
     summary["files"] = file_sizes(output)
-    print_made(filled.report.rows(), summary, check, of_files, as_json, quiet)
+    rows = filled.report.rows()
+    if mesh is not None:
+        summary["mesh"], rows = mesh.as_dict(), [*rows, *mesh.rows()]
+    print_made(rows, summary, check, of_files, as_json, quiet)
 
 
 def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
@@ -218,8 +247,9 @@ def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
     """
     formats = {format_of(path) for path in output}
     route: Route = given["route"] or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
+    told_apart = [form for form in (*PART_FORMATS, *MESH_FORMATS) if form not in TRIANGLE_FORMATS]
     if given["kind"] == BODIES:
-        require_formats(output, [form for form in PART_FORMATS if form not in TRIANGLE_FORMATS])
+        require_formats(output, told_apart)
     if route == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         return route
@@ -241,7 +271,7 @@ def _require_another_file(read: str, output: Sequence[str]) -> None:
     ------
     ParameterError
     """
-    for path in require_formats(output):
+    for path in require_formats(output, (*PART_FORMATS, *MESH_FORMATS)):
         if path.exists() and Path(read).exists() and path.samefile(read):
             raise ParameterError("output", str(path), "another file than the part that is filled and its core")
 

@@ -77,6 +77,7 @@ def _shell_alone(option: str, reason: str) -> Row:
 
 _FIT = _but_python("in `fit`, a `FitSettings`")
 _WRITING = _but_hosts("the host's exporters write")
+_MESHED = _but_hosts("the host's shapes hold no elements: `gyroid_cad.fill(...).mesh()`")
 _NO_PROGRESS = _but_hosts("the host's methods show none")
 _NO_TRIANGLES = _but_hosts("a host's shape needs a B-rep, which triangles are not")
 _OF_PAPER = _but_hosts("`Lattice.paper(...)`, then `to_cadquery` or `to_build123d`")
@@ -173,6 +174,9 @@ FILL = (
     _row("bc length", **_OF_BLOCK),
     _row("scale", **_OF_BLOCK),
     *_WRITTEN,
+    _row("element size", **_MESHED),
+    _row("elements through", **_MESHED),
+    _row("order", **_MESHED),
     *_ANSWER,
     _row("combination", **_ELSEWHERE, cadquery=Absent("the filled part takes the chain's place"), build123d="mode"),
 )

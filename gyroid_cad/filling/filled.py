@@ -9,15 +9,26 @@ from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
 from gyroid_cad.common.choices import Schema
-from gyroid_cad.common.formats import TRIANGLE_FORMATS, format_of, require_formats, require_meshing, require_settings
+from gyroid_cad.common.formats import (
+    MESH_FORMATS,
+    PART_FORMATS,
+    TRIANGLE_FORMATS,
+    format_of,
+    require_formats,
+    require_meshing,
+    require_settings,
+)
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.filling.report import FillReport
+from gyroid_cad.filling.tetrahedra import Meshed, element_length, require_elements, tetrahedra_of
 from gyroid_cad.filling.wanted import BODIES, FLUID_A, FLUID_B, SKIN, WALL
 from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import KernelShape, another_handle
+from gyroid_cad.mesh.finite_elements.files import require_mesh_format
+from gyroid_cad.mesh.tetrahedra.data import TetrahedralMesh
 from gyroid_cad.mesh.triangles.stl import require_near_origin
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
@@ -132,6 +143,53 @@ class Filled(HostShapes):
         require_meshing(limit)
         return limit
 
+    def mesh(
+        self,
+        element_size: float | None = None,
+        elements_through: float | None = None,
+        order: int = 1,
+        progress: Progress | None = None,
+    ) -> TetrahedralMesh:
+        """Tetrahedra of all bodies in one mesh: where bodies share a face, they share its nodes.
+
+        Nodes on the surface lie on the exact faces. The mesh has the names of the bodies and of their faces. It is made
+        by Netgen from triangles of our own: ``pip install 'gyroid_cad[mesh]'``.
+
+        Parameters
+        ----------
+        element_size : float, optional
+            Length of the elements' edges, in mm; where bodies are narrow they are shorter.
+        elements_through : float, optional
+            Instead, how many elements there are through the wall, about: 2 if neither is given.
+        order : {1, 2}
+            Elements of 4 nodes, or of 10.
+        progress : callable, optional
+            Called with (stage, done, total).
+
+        Raises
+        ------
+        ParameterError
+            Also of the bare surface, or if Netgen is not installed.
+        KernelError
+            If no mesh is found whose elements are sound and whose volumes are those of the bodies.
+
+        Examples
+        --------
+        >>> import cadquery as cq
+        >>> from gyroid_cad import FitSettings, fill
+        >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
+        >>> mesh = filled.mesh(element_size=1)
+        >>> mesh.names, mesh.element.name
+        (('sheet',), 'tetra')
+        """
+        if not self.report.closed:
+            raise ParameterError("kind", self.report.kind, "another: the bare surface bounds no volume to mesh")
+        require_elements(element_size, elements_through, order)
+        walls = self.report.min_wall, self.report.cell_size
+        size = element_length(element_size, elements_through, *walls)
+        volumes = {name: sum(one.volume for one in some) for name, some in self.sizes.items()}
+        return tetrahedra_of(Meshed(self.domains, self.face_names, volumes), size, order, progress)
+
     def write(
         self,
         *paths: str | os.PathLike[str],
@@ -142,8 +200,14 @@ class Filled(HostShapes):
         author: str = "",
         organisation: str = "",
         pcurves: bool = False,
+        element_size: float | None = None,
+        elements_through: float | None = None,
+        order: int = 1,
     ) -> None:
         """Write the filled part, as :meth:`gyroid_cad.Lattice.write` does a lattice.
+
+        Into files of meshes (.vtu, .msh, .inp, .cdb, .bdf, .nas) go tetrahedra, as of :meth:`mesh`, which takes the
+        last three parameters.
 
         Raises
         ------
@@ -156,7 +220,9 @@ class Filled(HostShapes):
         >>> filled = fill(cq.Workplane().box(4, 4, 4), cell_size=8, density=0.3, fit=FitSettings(5))
         >>> filled.write("light.step", "light.stl", deviation=0.1)
         """
-        targets, limit = require_formats(paths), self.deviation(deviation)
+        targets, limit = require_formats(paths, (*PART_FORMATS, *MESH_FORMATS)), self.deviation(deviation)
+        meshes = [require_mesh_format(path) for path in targets if format_of(path) in MESH_FORMATS]
+        require_elements(element_size, elements_through, order, bool(meshes))
         header = StepHeader(schema, author, organisation, pcurves)
         require_settings((1, 1, 1), limit, angle)
         for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
@@ -167,9 +233,11 @@ class Filled(HostShapes):
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
         sizes = [size for name in self.domains for size in self.sizes[name]]
         labels = self._labels()
-        for path in targets:
+        for path in (path for path in targets if path not in meshes):
             with timed(self.report.seconds, f"write {path.name}", progress):
                 write_shape(self.solid(), sizes, path, header, limit, angle, labels)
+        if meshes:
+            self.mesh(element_size, elements_through, order, progress).write(*meshes, progress=progress)
 
     def _labels(self) -> BodyLabels:
         """Names of all solids; of bodies that share their faces colours and the names of those too."""

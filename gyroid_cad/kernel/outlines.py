@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,17 @@ from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.GeomAbs import GeomAbs_C1, GeomAbs_Line
 from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
 from OCP.TopExp import TopExp
-from OCP.TopoDS import TopoDS_Face
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.arrays import dot, numbered_groups, unit
 from gyroid_cad.errors import KernelError
 from gyroid_cad.kernel.borders import FaceBorders, FaceSurfaces
+from gyroid_cad.kernel.check import faces_of
 from gyroid_cad.kernel.compat import NumberedShapes, RealArray, as_edge, as_vertex
 from gyroid_cad.mesh.triangles.outlined import Outlines
 from gyroid_cad.mesh.triangles.trimmed import FaceTriangles, triangulated_faces
 
-__all__ = ["face_triangles"]
+__all__ = ["SharedFaces", "face_triangles", "shared_triangles"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -70,7 +72,50 @@ def face_triangles(
         edges.halve(borders.edges_of(made.crossed))
     backwards = np.array([face.Orientation() == TopAbs_REVERSED for face in faces])[made.faces]
     triangles = np.where(backwards[:, np.newaxis], made.triangles[:, ::-1], made.triangles)
-    return FaceTriangles(made.vertices, triangles, made.faces, made.crossed)
+    places = np.where(backwards[:, np.newaxis, np.newaxis], made.places[:, ::-1], made.places)
+    return FaceTriangles(made.vertices, triangles, made.faces, made.crossed, places)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SharedFaces:
+    """Faces of several shapes, each once, with their triangles.
+
+    Attributes
+    ----------
+    surfaces : FaceSurfaces
+    triangles : FaceTriangles
+        Seen from outside of the first shape that has the face; corners lie on the faces.
+    users : ndarray of int, shape (faces, 2)
+        Which shapes have each face, from 1; 0 where there is no second one.
+    first : ndarray of int, shape (faces, 2)
+        The first of them, from 0, and the number of the face in it.
+    """
+
+    surfaces: FaceSurfaces
+    triangles: FaceTriangles
+    users: Integers
+    first: Integers
+
+
+def shared_triangles(shapes: Sequence[TopoDS_Shape], deviation: float, angle: float) -> SharedFaces:
+    """Triangles of all faces of shapes that may share some, as of :func:`face_triangles`."""
+    numbers, faces = NumberedShapes(), list[TopoDS_Face]()
+    users, first = list[list[int]](), list[tuple[int, int]]()
+    for shape_number, shape in enumerate(shapes):
+        for face_number, face in enumerate(faces_of(shape)):
+            number = int(numbers.Add(face)) - 1
+            if number == len(faces):
+                faces.append(face)
+                users.append([shape_number + 1, 0])
+                first.append((shape_number, face_number))
+            else:
+                users[number][1] = shape_number + 1
+    surfaces = FaceSurfaces(faces)
+    made = face_triangles(faces, deviation, angle, (surfaces, FaceBorders(faces)))
+    # Those inside faces had been moved a little, for the sake of the volume.
+    points = made.vertices.copy()
+    points[made.triangles.ravel()] = surfaces.evaluated(np.repeat(made.faces, 3), made.places.reshape(-1, 2))[0]
+    return SharedFaces(surfaces, replace(made, vertices=points), np.array(users), np.array(first))
 
 
 def _outlines(borders: FaceBorders, edges: _Edges, surfaces: FaceSurfaces) -> Outlines:

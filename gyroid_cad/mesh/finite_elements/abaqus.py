@@ -7,6 +7,7 @@ meshio's writer is passed over: it names hexahedra C3D8RH and C3D20RH, puts 21 n
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from typing import TextIO
 
@@ -15,19 +16,26 @@ from numpy.typing import NDArray
 
 from gyroid_cad.common.progress import Progress, report_progress
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.data import MeshData
+from gyroid_cad.mesh.finite_elements.data import WrittenMesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
 __all__ = ["abaqus_name", "write_abaqus"]
 
 Integers = NDArray[np.int64]
 
-_TYPES = {"hexahedron": "C3D8", "hexahedron20": "C3D20R", "quad": "S4", "quad8": "S8R"}
+_TYPES = {
+    "hexahedron": "C3D8",
+    "hexahedron20": "C3D20R",
+    "quad": "S4",
+    "quad8": "S8R",
+    "tetra": "C3D4",
+    "tetra10": "C3D10",
+}
 _ROWS_AT_ONCE = 20_000
 _NUMBERS_A_LINE = 16
 
 
-def abaqus_name(mesh: MeshData) -> str:
+def abaqus_name(mesh: WrittenMesh) -> str:
     """Abaqus's name of a mesh's elements.
 
     Raises
@@ -42,7 +50,7 @@ def abaqus_name(mesh: MeshData) -> str:
 
 
 def write_abaqus(
-    mesh: MeshData, file: TextIO, pairs: PeriodicPairs | None = None, progress: Progress | None = None
+    mesh: WrittenMesh, file: TextIO, pairs: PeriodicPairs | None = None, progress: Progress | None = None
 ) -> None:
     """Write nodes, elements, their sets and surfaces; materials and steps are the user's, by ``*INCLUDE``.
 
@@ -51,7 +59,7 @@ def write_abaqus(
 
     Parameters
     ----------
-    mesh : MeshData
+    mesh : WrittenMesh
     file : text file
     pairs : PeriodicPairs, optional
     progress : callable, optional
@@ -70,16 +78,19 @@ def write_abaqus(
         rows = mesh.points[first : first + _ROWS_AT_ONCE].tolist()
         file.writelines(f"{number},{x:.12e},{y:.12e},{z:.12e}\n" for number, (x, y, z) in enumerate(rows, first + 1))
         report_progress(progress, "mesh", first, total)
-    file.write(f"*ELEMENT, TYPE={name}, ELSET=WALL\n")
-    for first in range(0, len(mesh.cells), _ROWS_AT_ONCE):
-        rows = (mesh.cells[first : first + _ROWS_AT_ONCE] + 1).tolist()
-        file.writelines(_lines([number, *row]) for number, row in enumerate(rows, first + 1))
-        report_progress(progress, "mesh", len(mesh.points) + first, total)
+    for region, members in mesh.regions().items():
+        file.write(f"*ELEMENT, TYPE={name}, ELSET={set_name_of(region)}\n")
+        for first in range(0, len(members), _ROWS_AT_ONCE):
+            some = members[first : first + _ROWS_AT_ONCE]
+            rows = (np.column_stack([some, mesh.cells[some]]) + 1).tolist()
+            file.writelines(map(_lines, rows))
+            report_progress(progress, "mesh", len(mesh.points) + int(some[0]), total)
     for set_name, elements in mesh.element_sets().items():
         _write_set(file, "ELSET", set_name, elements)
     for set_name, nodes in _node_sets(mesh, pairs):
         _write_set(file, "NSET", set_name, nodes)
-    for surface_name, surface in mesh.surfaces().items():
+    for face_name, surface in mesh.surfaces().items():
+        surface_name = set_name_of(face_name)
         faces = np.unique(surface.faces).tolist()
         parts = {f"{surface_name}_S{face + 1}": surface.elements[surface.faces == face] for face in faces}
         for set_name, elements in parts.items():
@@ -89,12 +100,21 @@ def write_abaqus(
     report_progress(progress, "mesh", total, total)
 
 
-def _node_sets(mesh: MeshData, pairs: PeriodicPairs | None) -> Iterator[tuple[str, Integers]]:
-    yield from mesh.node_sets().items()
+def _node_sets(mesh: WrittenMesh, pairs: PeriodicPairs | None) -> Iterator[tuple[str, Integers]]:
+    yield from ((set_name_of(name), nodes) for name, nodes in mesh.node_sets().items())
     for blocks, nodes in (pairs.by_translation() if pairs else {}).items():
         name = "_".join(f"M{-count}" if count < 0 else str(count) for count in blocks)
         for which, some in zip(("FIRST", "SECOND"), nodes, strict=True):
             yield f"PERIODIC_{name}_{which}, UNSORTED", some
+
+
+def set_name_of(name: str) -> str:
+    """Name of a region or a face as Abaqus takes it: of letters, digits and underscores.
+
+    >>> set_name_of("fluid-a/face 1"), set_name_of("a:1"), set_name_of("FACE_A")
+    ('fluid_a_face_1', 'a_1', 'FACE_A')
+    """
+    return re.sub(r"\W", "_", name)
 
 
 def _write_set(file: TextIO, keyword: str, name: str, numbers: Integers) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from gyroid_cad.mesh.finite_elements.elements import BOTTOM, EDGE_FACES, TOP, El
 from gyroid_cad.mesh.nodes import FACE_A, FACE_B, FREE_WALLS
 from gyroid_cad.wall.complex import CellComplex
 
-__all__ = ["MeshData", "Surface", "members"]
+__all__ = ["MeshData", "Surface", "WrittenMesh", "members"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,6 +35,37 @@ class Surface:
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+
+class WrittenMesh(Protocol):
+    """Elements and their sets, as the writers ask for them; ``parts`` are numbers of what each element is one of."""
+
+    @property
+    def element(self) -> ElementType: ...
+
+    @property
+    def points(self) -> Floats: ...
+
+    @property
+    def cells(self) -> Integers: ...
+
+    @property
+    def parts(self) -> Integers: ...
+
+    @property
+    def dimension(self) -> int: ...
+
+    def regions(self) -> dict[str, Integers]: ...
+
+    def numbers(self) -> dict[str, Integers]: ...
+
+    def surfaces(self) -> dict[str, Surface]: ...
+
+    def surface_nodes(self, surface: Surface) -> Integers: ...
+
+    def node_sets(self) -> dict[str, Integers]: ...
+
+    def element_sets(self) -> dict[str, Integers]: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,6 +161,56 @@ class MeshData:
         """
         numbers = np.arange(len(self.points)) if self.kept is None else self.kept
         return np.divmod(numbers, self.levels)
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the elements: 3 of hexahedra, 2 of a mid-surface.
+
+        Examples
+        --------
+        >>> Lattice((1, 1, 1), 10, thickness=0.8).quadrilaterals(2).dimension
+        2
+        """
+        return 3 if self.layers else 2
+
+    def regions(self) -> dict[str, Integers]:
+        """Elements by what they fill: all of them the wall.
+
+        Examples
+        --------
+        >>> mesh = Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2)
+        >>> {name: len(elements) for name, elements in mesh.regions().items()}
+        {'WALL': 96}
+        """
+        return {"WALL": np.arange(len(self.cells))}
+
+    @property
+    def parts(self) -> Integers:
+        """Bounding cell of each element, from 1; shape (elements,).
+
+        Examples
+        --------
+        >>> int(Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2).parts.max())
+        4
+        """
+        return np.asarray(self.complex.placements.bounding_cell[self.complex.patch_placement][self.element_patch] + 1)
+
+    def numbers(self) -> dict[str, Integers]:
+        """Numbers of every element's patch, bounding cell, cubic cell and layer, from 1; shape (elements,) each.
+
+        Examples
+        --------
+        >>> list(Lattice((1, 1, 1), 10, thickness=0.8).hexahedra(2).numbers())
+        ['patch', 'bounding_cell', 'cubic_cell', 'layer']
+        """
+        patch = self.element_patch
+        cell_of_patch = np.unique(self.complex.patch_cell, axis=0, return_inverse=True)[1].ravel()
+        return {
+            "patch": patch + 1,
+            "bounding_cell": self.parts,
+            "cubic_cell": cell_of_patch[patch] + 1,
+            "layer": self.element_layer + 1,
+        }
 
     def surfaces(self) -> dict[str, Surface]:
         """Faces A and B of the wall and its free side walls, as faces of elements; empty of a mid-surface.

@@ -1,6 +1,7 @@
 """Finite elements: where their nodes lie and which of them their faces have, in VTK's order.
 
-Abaqus numbers the nodes of 8 and 20 node hexahedra the same way, and their faces S1 to S6 as they stand here.
+Abaqus numbers the nodes of 8 and 20 node hexahedra, and of 4 and 10 node tetrahedra, the same way, and their faces S1
+to S6, or S4, as they stand here.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from gyroid_cad.errors import ParameterError
 
-__all__ = ["BOTTOM", "EDGE_FACES", "TOP", "ElementType", "element_type"]
+__all__ = ["BOTTOM", "EDGE_FACES", "TETRAHEDRA", "TOP", "ElementType", "element_type", "require_order"]
 
 Integers = NDArray[np.int64]
 
@@ -51,8 +52,8 @@ class ElementType:
         1 linear, 2 quadratic.
     nodes : ndarray of int, shape (nodes, 3)
         Place of each in the element, in halves of its sides: along u, v and across the wall.
-    faces : ndarray of int, shape (6, nodes of a face)
-        Nodes of each face of a hexahedron, outwards; none of a quadrilateral.
+    faces : ndarray of int, shape (6 or 4, nodes of a face)
+        Nodes of each face of a hexahedron or a tetrahedron, outwards; none of a quadrilateral.
     face_name : str
         meshio's, of the faces.
     """
@@ -86,6 +87,37 @@ _QUADRILATERALS = [
 ]
 
 
+_TETRAHEDRON = [
+    (0, 0, 0),
+    (2, 0, 0),
+    (0, 2, 0),
+    (0, 0, 2),
+    (1, 0, 0),
+    (1, 1, 0),
+    (0, 1, 0),
+    (0, 0, 1),
+    (1, 0, 1),
+    (0, 1, 1),
+]
+_TETRAHEDRON_FACES = np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]])
+# Of 4 nodes, and of 10.
+TETRAHEDRA = (
+    ElementType("tetra", 1, np.array(_TETRAHEDRON[:4]), _TETRAHEDRON_FACES[:, :3], "triangle"),
+    ElementType("tetra10", 2, np.array(_TETRAHEDRON), _TETRAHEDRON_FACES, "triangle6"),
+)
+
+
+def require_order(order: int) -> None:
+    """Check the order of elements.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if order not in (1, 2) or isinstance(order, bool):
+        raise ParameterError("order", order, "1 for linear elements or 2 for quadratic ones")
+
+
 def element_type(solid: bool, order: int, full: bool = False) -> ElementType:
     """The element of an order, of a solid or of a surface.
 
@@ -100,8 +132,7 @@ def element_type(solid: bool, order: int, full: bool = False) -> ElementType:
     ------
     ParameterError
     """
-    if order not in (1, 2) or isinstance(order, bool):
-        raise ParameterError("order", order, "1 for linear elements or 2 for quadratic ones")
+    require_order(order)
     if full and order == 1:
         raise ParameterError("full", full, "none with linear elements, which have nodes at their corners only")
     return (_HEXAHEDRA if solid else _QUADRILATERALS)[order - 1 + full]

@@ -25,7 +25,7 @@ from gyroid_cad.common.formats import (
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.abaqus import abaqus_name, write_abaqus
-from gyroid_cad.mesh.finite_elements.data import MeshData, members
+from gyroid_cad.mesh.finite_elements.data import WrittenMesh, members
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
 __all__ = ["require_mesh_format", "write_mesh_files"]
@@ -55,7 +55,7 @@ def require_mesh_format(path: str | os.PathLike[str], full: bool = False) -> Pat
 
 
 def write_mesh_files(
-    mesh: MeshData,
+    mesh: WrittenMesh,
     paths: Sequence[str | os.PathLike[str]],
     pairs: PeriodicPairs | None = None,
     progress: Progress | None = None,
@@ -72,7 +72,7 @@ def write_mesh_files(
             _write(mesh, target, pairs, progress)
 
 
-def _write(mesh: MeshData, target: Path, pairs: PeriodicPairs | None, progress: Progress | None) -> None:
+def _write(mesh: WrittenMesh, target: Path, pairs: PeriodicPairs | None, progress: Progress | None) -> None:
     form = require_format("output", target, MESH_FORMATS)
     with replacing(target) as temporary:
         if form is ABAQUS:
@@ -103,12 +103,14 @@ def _mapdl_archive(path: str | os.PathLike[str]) -> Any:
     return mapdl_archive, pyvista
 
 
-def _write_ansys(mesh: MeshData, path: Path) -> None:
+def _write_ansys(mesh: WrittenMesh, path: Path) -> None:
     mapdl_archive, pyvista = _mapdl_archive(path)
     vtk_type = {
         "hexahedron": pyvista.CellType.HEXAHEDRON,
         "hexahedron20": pyvista.CellType.QUADRATIC_HEXAHEDRON,
         "quad": pyvista.CellType.QUAD,
+        "tetra": pyvista.CellType.TETRA,
+        "tetra10": pyvista.CellType.QUADRATIC_TETRA,
     }.get(mesh.element.name)
     if vtk_type is None:
         raise ParameterError("order", mesh.element.order, "1 for the mid-surface in .cdb files")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.errors import ExportError
-from gyroid_cad.mesh.finite_elements.data import MeshData, members
+from gyroid_cad.mesh.finite_elements.data import WrittenMesh, members
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
 __all__ = ["write_gmsh", "write_nastran", "write_vtu"]
@@ -19,8 +19,6 @@ __all__ = ["write_gmsh", "write_nastran", "write_vtu"]
 Integers = NDArray[np.int64]
 
 _NASTRAN_DIGITS = 10
-# The whole wall's physical group in Gmsh files; surfaces follow. Bounding cells are told by the element's entity.
-_WALL_GROUP = 1
 
 
 def _write(mesh: Any, path: Path, file_format: str, **options: Any) -> None:
@@ -31,19 +29,7 @@ def _write(mesh: Any, path: Path, file_format: str, **options: Any) -> None:
         raise ExportError(f"the mesh was not written: {problem}") from problem
 
 
-def _ids(mesh: MeshData) -> dict[str, Integers]:
-    """Numbers of every element's patch, bounding cell, cubic cell and layer, from 1; shape (elements,) each."""
-    complex, patch = mesh.complex, mesh.element_patch
-    cell_of_patch = np.unique(complex.patch_cell, axis=0, return_inverse=True)[1].ravel()
-    return {
-        "patch": patch + 1,
-        "bounding_cell": complex.placements.bounding_cell[complex.patch_placement][patch] + 1,
-        "cubic_cell": cell_of_patch[patch] + 1,
-        "layer": mesh.element_layer + 1,
-    }
-
-
-def write_vtu(mesh: MeshData, path: Path, pairs: PeriodicPairs | None) -> None:
+def write_vtu(mesh: WrittenMesh, path: Path, pairs: PeriodicPairs | None) -> None:
     """Write VTU with node sets, periodic pairs and numbers of cells.
 
     Raises
@@ -59,24 +45,26 @@ def write_vtu(mesh: MeshData, path: Path, pairs: PeriodicPairs | None) -> None:
         at_nodes["periodic_first"] = np.arange(len(mesh.points))
         at_nodes["periodic_first"][pairs.second] = pairs.first
     cells = [(mesh.element.name, mesh.cells)]
-    numbers = {name: [ids] for name, ids in _ids(mesh).items()}
+    numbers = {name: [ids] for name, ids in mesh.numbers().items()}
     _write(meshio.Mesh(mesh.points, cells, at_nodes, numbers), path, "vtu")
 
 
-def write_gmsh(mesh: MeshData, path: Path) -> None:
-    """Write Gmsh 2.2 with the wall and its surfaces as physical groups.
+def write_gmsh(mesh: WrittenMesh, path: Path) -> None:
+    """Write Gmsh 2.2 with the regions and their surfaces as physical groups; bounding cells are entities.
 
     Raises
     ------
     ExportError
     """
 
-    ids = _ids(mesh)
-    dimension = 3 if mesh.layers else 2
     blocks = [(mesh.element.name, mesh.cells)]
-    groups, entities = [np.full(len(mesh.cells), _WALL_GROUP)], [ids["bounding_cell"]]
-    names = {"WALL": np.array([_WALL_GROUP, dimension])}
-    for group, (name, surface) in enumerate(mesh.surfaces().items(), _WALL_GROUP + 1):
+    regions = mesh.regions()
+    groups, entities = [np.zeros(len(mesh.cells), dtype=np.int64)], [mesh.parts]
+    names = {}
+    for group, (name, elements) in enumerate(regions.items(), 1):
+        groups[0][elements] = group
+        names[name] = np.array([group, mesh.dimension])
+    for group, (name, surface) in enumerate(mesh.surfaces().items(), len(regions) + 1):
         blocks.append((mesh.element.face_name, mesh.surface_nodes(surface)))
         groups.append(np.full(len(surface.elements), group))
         entities.append(np.full(len(surface.elements), group))
@@ -85,12 +73,12 @@ def write_gmsh(mesh: MeshData, path: Path) -> None:
     _write(meshio.Mesh(mesh.points, blocks, cell_data=data, field_data=names), path, "gmsh22", binary=True)
 
 
-def write_nastran(mesh: MeshData, path: Path) -> None:
-    """Write a whole NASTRAN deck, without materials and loads; bounding cells are properties."""
+def write_nastran(mesh: WrittenMesh, path: Path) -> None:
+    """Write a whole NASTRAN deck, without materials and loads; bounding cells or regions are properties."""
 
     # meshio has 16 characters for a number, and stops at one that would take more.
     decimals = _NASTRAN_DIGITS - 1 - int(np.floor(np.log10(np.abs(mesh.points).max())))
-    properties = {"nastran:ref": [_ids(mesh)["bounding_cell"]]}
+    properties = {"nastran:ref": [mesh.parts]}
     rounded = meshio.Mesh(np.round(mesh.points, decimals), [(mesh.element.name, mesh.cells)], cell_data=properties)
     text = StringIO()
     meshio.nastran.write(text, rounded)

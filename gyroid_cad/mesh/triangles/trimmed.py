@@ -40,12 +40,15 @@ class FaceTriangles:
     faces : ndarray of int, shape (triangles,)
     crossed : ndarray of bool, shape (faces,)
         Faces whose borders cross themselves, with the steps they have.
+    places : ndarray, shape (triangles, 3, 2)
+        Parameters of the corners, on their faces.
     """
 
     vertices: Floats
     triangles: Integers
     faces: Integers
     crossed: Booleans
+    places: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +120,7 @@ def triangulated_faces(
         np.concatenate([whole.faces, owner[kept]]),
         np.concatenate([whole.corners, work.places[work.triangles[kept]]]),
     )
-    return FaceTriangles(_of_volume(both, surfaces, len(points)), both.triangles, both.faces, crossed)
+    return FaceTriangles(_of_volume(both, surfaces, len(points)), both.triangles, both.faces, crossed, both.corners)
 
 
 def _first_of(vertices: Integers, first: int) -> Integers:

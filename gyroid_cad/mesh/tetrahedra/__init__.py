@@ -1,0 +1,1 @@
+"""Tetrahedra of bodies that share faces: even triangles on the faces, then the volume between them."""

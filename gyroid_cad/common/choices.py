@@ -18,6 +18,7 @@ __all__ = [
     "ROUTES",
     "SCHEMAS",
     "SURFACE_NAMES",
+    "TARGETS",
     "TRIMS",
     "CheckedBy",
     "FitName",
@@ -51,4 +52,6 @@ TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)
 ROUTES: tuple[Route, ...] = get_args(Route)
 PROFILES: tuple[Profile, ...] = get_args(Profile)
+# What else than cell size, thickness and density may describe a lattice.
+TARGETS = ("porosity", "pore_size", "throat", "hydraulic_diameter", "area_per_volume", "curvature_radius")
 FITS: tuple[FitName, ...] = get_args(FitName)

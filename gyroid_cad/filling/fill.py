@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.choices import Kind, Route, SurfaceName
+from gyroid_cad.common.choices import TARGETS, Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
@@ -26,7 +26,16 @@ from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, open_faces, 
 from gyroid_cad.filling.report import FillReport, FluidReport, fluid_report, joint_report, warn_of_uncovered
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
+from gyroid_cad.filling.wanted import (
+    BODIES,
+    NETWORK_A,
+    NETWORK_B,
+    SHEET,
+    SURFACE,
+    Region,
+    checked_skin,
+    grams_of,
+)
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round
@@ -38,6 +47,8 @@ from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.fitted import Closeness, valid_tolerance
+from gyroid_cad.wall.laws import wall_from
+from gyroid_cad.wall.limits import require_none_beside_lattice
 from gyroid_cad.wall.parameters import LatticeParameters
 
 __all__ = ["fill"]
@@ -72,6 +83,12 @@ def fill(
     deviation: float | None = None,
     repair: bool = False,
     compact: float | None = None,
+    porosity: FieldLike | None = None,
+    pore_size: float | None = None,
+    throat: float | None = None,
+    hydraulic_diameter: float | None = None,
+    area_per_volume: float | None = None,
+    curvature_radius: float | None = None,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -138,6 +155,9 @@ def fill(
         Close a part of triangles that is open, at that route; the report says what was done.
     compact : float, optional
         Instead of ``tolerance`` or ``fit``, largest deviation in mm, met by as few control points as can be.
+    porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius : optional
+        Two of these and of ``cell_size``, ``thickness`` and ``density``, as of :class:`gyroid_cad.Lattice`; of channels
+        and bodies the wall's.
 
     Returns
     -------
@@ -160,6 +180,11 @@ def fill(
     True
     """
     kind = _kind_beside(lattice, kind)
+    values = (porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius)
+    targets = {name: value for name, value in zip(TARGETS, values, strict=True) if value is not None}
+    if lattice is not None:
+        require_none_beside_lattice(targets)
+    cell_size, thickness, density = wall_from(surface, kind, cell_size, thickness, density, targets)
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)

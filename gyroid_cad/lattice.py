@@ -95,6 +95,10 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         Of a lattice that is trimmed: the wall, or what :func:`~gyroid_cad.fill` makes of the block. A network's density
         is its own.
 
+    porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius : optional
+        As of :class:`gyroid_cad.Design`: two of these and of ``cell_size``, ``thickness`` and ``density``, which then
+        follow from them and are what the lattice keeps. Only a porosity beside a cell size may vary.
+
     Raises
     ------
     ParameterError

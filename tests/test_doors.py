@@ -28,8 +28,9 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopoDS import TopoDS
 from remembered import filled_once
 
-from gyroid_cad import FitError, IslandsWarning, Lattice, fill
+from gyroid_cad import Design, FitError, IslandsWarning, Lattice, design, fill
 from gyroid_cad.cli.app import commands, main
+from gyroid_cad.common.choices import TARGETS
 from gyroid_cad.common.doors import DOORS, FILL, LATTICE, Absent
 from gyroid_cad.filling import fill as filling
 from gyroid_cad.filling.filled import Filled
@@ -178,6 +179,12 @@ def corners_are_poles(text: str) -> bool:
     return bool(corners & set(re.findall(r"#\d+", "".join(re.findall(r"=B_SPLINE_CURVE[^;]*", text)))))
 
 
+def described_by(made: Design, look: Look, instead: str) -> dict[str, Case]:
+    """Cases of a lattice that is described by its pores, its area or its curvature beside its cell."""
+    names = {name.replace("_", " "): getattr(made, name) for name in TARGETS[1:]}
+    return {name: Case({name: value}, look, (instead,)) for name, value in names.items()}
+
+
 WRITTEN = {
     "file": Case({"file": "made.brep"}, lambda made, usual: read_brep(made.file).ShapeType() is not None),
     "schema": Case({"file": "made.step", "schema": "ap242"}, lambda made, usual: b"AP242" in made.file.read_bytes()),
@@ -220,6 +227,9 @@ CASES: dict[str, dict[str, Case]] = {
         "thickness": Case({"thickness": 1.2}, lambda made, usual: near(made.volume / usual.volume, 1.5)),
         "density": Case({"density": 0.3}, lambda made, usual: near(made.volume, 300), ("thickness",)),
         "porosity": Case({"porosity": 0.7}, lambda made, usual: near(made.volume, 300), ("thickness",)),
+        **described_by(
+            design(cell_size=10, thickness=1.2), lambda made, usual: near(made.volume / usual.volume, 1.5), "thickness"
+        ),
         "surface": Case({"surface": "diamond"}, lambda made, usual: near(made.faces / usual.faces, 2, 0.5)),
         "tolerance": Case({"tolerance": 1e-4}, lambda made, usual: made.poles > usual.poles),
         "compact": Case({"compact": 3e-3}, lambda made, usual: made.poles == 6, ("control points",)),
@@ -272,6 +282,9 @@ CASES: dict[str, dict[str, Case]] = {
         "thickness": Case({"thickness": 1.2}, grown, ("density",)),
         "density": Case({"density": 0.3}, lambda made, usual: near(made.volume, 0.3 * SIDE**3, 0.1)),
         "porosity": Case({"porosity": 0.7}, lambda made, usual: near(made.volume, 0.3 * SIDE**3, 0.1), ("density",)),
+        **described_by(
+            design(cell_size=CELL, density=0.3), lambda made, usual: near(made.volume, 0.3 * SIDE**3, 0.1), "density"
+        ),
         "surface": Case({"surface": "diamond"}, lambda made, usual: made.faces > usual.faces),
         "tolerance": Case(
             {"density": "0.2 + 0.005*x", "tolerance": 2e-5}, lambda made, usual: made.poles > 10, ("control points",)

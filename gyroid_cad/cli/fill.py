@@ -13,14 +13,12 @@ from gyroid_cad.cli.check import checked_files, print_made
 from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import (
     PAPER_OPTIONS,
-    density_of,
+    described_by,
     fit_of,
     infill_options,
     lattice_of,
     listed,
     printed_options,
-    require_given,
-    require_one_wall,
     take_defaults,
 )
 from gyroid_cad.cli.options import (
@@ -303,11 +301,8 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
         raise click.UsageError(
             f"give {listed(['cells'])} with {listed(of_blocks)}: only a block of cells is scaled or mapped"
         )
-    require_given(given, "cell_size")
-    if given["kind"] != "surface":
-        require_one_wall(given)
-    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface", "compact")}
-    return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
+    endless = {name: given[name] for name in ("tolerance", "surface", "compact")}
+    return {**own, **endless, **described_by(given, bare=given["kind"] == SURFACE), "fit": fit_of(given)}
 
 
 def _face(opening: str) -> str | list[float] | tuple[str, list[float]]:

@@ -19,6 +19,7 @@ __all__ = [
     "ROUTES",
     "SCHEMAS",
     "SURFACE_NAMES",
+    "TARGETS",
     "TRIMS",
     "BodyName",
     "CheckedBy",
@@ -56,4 +57,6 @@ SCHEMAS: tuple[Schema, ...] = get_args(Schema)
 ROUTES: tuple[Route, ...] = get_args(Route)
 PROFILES: tuple[Profile, ...] = get_args(Profile)
 BODY_NAMES: tuple[BodyName, ...] = get_args(BodyName)
+# What else than cell size, thickness and density may describe a lattice.
+TARGETS = ("porosity", "pore_size", "throat", "hydraulic_diameter", "area_per_volume", "curvature_radius")
 FITS: tuple[FitName, ...] = get_args(FitName)

@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.cache import Cache
-from gyroid_cad.common.choices import Kind, Route, SurfaceName
+from gyroid_cad.common.choices import TARGETS, Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.bodies import Made, mouths_of, with_own_names
+from gyroid_cad.filling.bodies import with_own_names
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
@@ -24,11 +23,21 @@ from gyroid_cad.filling.forecast import require_cover
 from gyroid_cad.filling.infill import Foreseen, InfillIn, described_infill
 from gyroid_cad.filling.part import FilledBy, Filling, Outcome, bodies_of, part_of, without_specks
 from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, checked_plug, open_faces, require_of_bodies
-from gyroid_cad.filling.report import FillReport, FluidReport, fluid_report, joint_report, warn_of_uncovered
-from gyroid_cad.filling.throats import narrowest_throat
+from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
+from gyroid_cad.filling.throats import fluid_of
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
+from gyroid_cad.filling.wanted import (
+    BODIES,
+    NETWORK_A,
+    NETWORK_B,
+    SHEET,
+    SURFACE,
+    Region,
+    checked_skin,
+    grams_of,
+    kind_beside,
+)
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.depth import NamedFaces
 from gyroid_cad.kernel.extent import solid_of_box
@@ -43,11 +52,11 @@ from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.fitted import Closeness, valid_tolerance
+from gyroid_cad.wall.laws import wall_from
+from gyroid_cad.wall.limits import require_none_beside_lattice
 from gyroid_cad.wall.parameters import LatticeParameters
 
 __all__ = ["fill", "filled_block"]
-
-Floats = NDArray[np.float64]
 
 # Blocks that were filled last.
 _blocks: Cache[Hashable, Filled] = Cache()
@@ -81,6 +90,12 @@ def fill(
     deviation: float | None = None,
     repair: bool = False,
     compact: float | None = None,
+    porosity: FieldLike | None = None,
+    pore_size: float | None = None,
+    throat: float | None = None,
+    hydraulic_diameter: float | None = None,
+    area_per_volume: float | None = None,
+    curvature_radius: float | None = None,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -150,6 +165,9 @@ def fill(
         Close a part of triangles that is open, at that route; the report says what was done.
     compact : float, optional
         Instead of ``tolerance`` or ``fit``, largest deviation in mm, met by as few control points as can be.
+    porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius : optional
+        Two of these and of ``cell_size``, ``thickness`` and ``density``, as of :class:`gyroid_cad.Lattice`; of channels
+        and bodies the wall's.
 
     Returns
     -------
@@ -171,7 +189,12 @@ def fill(
     >>> abs(filled.report.density - 0.3) < 0.01
     True
     """
-    kind = _kind_beside(lattice, kind)
+    kind = kind_beside(None if lattice is None else lattice.kind, kind)
+    values = (porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius)
+    targets = {name: value for name, value in zip(TARGETS, values, strict=True) if value is not None}
+    if lattice is not None:
+        require_none_beside_lattice(targets)
+    cell_size, thickness, density = wall_from(surface, kind, cell_size, thickness, density, targets)
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
@@ -253,14 +276,6 @@ def filled_block(lattice: LatticeParameters, progress: Progress | None = None) -
     return _blocks.get((lattice.spec(), lattice.kind, lattice.density), made)
 
 
-def _kind_beside(lattice: LatticeParameters | None, kind: Kind) -> Kind:
-    if lattice is None or lattice.kind in (SHEET, kind):
-        return kind
-    if kind != SHEET:
-        raise ParameterError("kind", kind, f"none beside a lattice whose own is {lattice.kind}")
-    return lattice.kind
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wanted:
     """Lattice, skin and core that every solid of a part is filled with."""
@@ -331,7 +346,6 @@ def _reported(
     kind: Kind,
     grams: float | None,
 ) -> Filled:
-
     domains = outcome.domains
     skin = None if filling.hollow is None else filling.hollow.thickness
     shapes = {
@@ -345,7 +359,7 @@ def _reported(
     volume = sum(made.volume for made in material)
     walls = [outcome.infill.min_thickness] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
     x, y, z = outcome.shift.tolist()
-    reports = tuple(_fluid(name, some, filling, outcome) for name, some in domains.items() if name in fluids)
+    reports = tuple(fluid_of(name, some, filling, outcome) for name, some in domains.items() if name in fluids)
     report = FillReport(
         kind=kind,
         cell_size=filling.cell_size,
@@ -383,12 +397,3 @@ def _reported(
         name: tuple(called for made in some for called in with_own_names(made, own)) for name, some in domains.items()
     }
     return Filled(shapes, report, sizes, face_names)
-
-
-def _fluid(name: str, made: Sequence[Made], filling: FilledBy, outcome: Outcome) -> FluidReport:
-    volume, wetted = (sum(getattr(one, of) for one in made) for of in ("volume", "wetted"))
-    region = next(region for region in filling.regions if region.name == name)
-    dead_ends = sum(mouths_of(one) < 2 for one in made)
-    with filling.timed("throats"):
-        throat = narrowest_throat(filling.of(name), outcome.infill, region)
-    return fluid_report(name, volume, wetted, len(made), dead_ends, throat)

@@ -36,12 +36,18 @@ from gyroid_cad.wall.distances import in_wall
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import Closeness, LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.limits import require_cell_size
+from gyroid_cad.wall.limits import require_cell_size, require_none_beside_lattice
 from gyroid_cad.wall.offset import Wall, side_along
 from gyroid_cad.wall.parameters import LatticeParameters
 from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill"]
+__all__ = [
+    "Infill",
+    "InfillIn",
+    "block_infill",
+    "described_infill",
+    "endless_infill",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -164,11 +170,8 @@ def described_infill(
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
     if lattice is not None:
-        given = {"cell_size": cell_size, "thickness": thickness, "density": density}
-        given |= {"tolerance": closeness.tolerance, "compact": closeness.compact}
-        for name, value in given.items():
-            if value is not None:
-                raise ParameterError(name, value, "none beside a lattice, which has its own")
+        fit = {"tolerance": closeness.tolerance, "compact": closeness.compact}
+        require_none_beside_lattice({"cell_size": cell_size, "thickness": thickness, "density": density, **fit})
         regions = _regions_beside(lattice, kind)
 
         def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:

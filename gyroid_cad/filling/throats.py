@@ -7,6 +7,7 @@ openings. Without openings to pass between the throat is that of the lattice its
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,7 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from gyroid_cad.filling.bodies import Made, mouths_of
 from gyroid_cad.filling.infill import Infill
+from gyroid_cad.filling.part import FilledBy, Outcome
+from gyroid_cad.filling.report import FluidReport, fluid_report
 from gyroid_cad.filling.wanted import Region
 from gyroid_cad.kernel.part import Part, triangles_by_face
 from gyroid_cad.kernel.skin import Hollow
@@ -22,7 +26,7 @@ from gyroid_cad.mesh.triangles.spread import spread_points
 from gyroid_cad.wall.distances import tree_of
 from gyroid_cad.wall.pore_limits import network_throats
 
-__all__ = ["narrowest_throat"]
+__all__ = ["fluid_of", "narrowest_throat"]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -180,3 +184,13 @@ def _passing(free: Floats, openings: list[Integers]) -> float:
         else:
             high = middle
     return float(values[low]) if low >= 0 else 0.0
+
+
+def fluid_of(name: str, made: Sequence[Made], filling: FilledBy, outcome: Outcome) -> FluidReport:
+    """Report on the bodies of a fluid, by its name, once a part has been filled."""
+    volume, wetted = (sum(getattr(one, of) for one in made) for of in ("volume", "wetted"))
+    region = next(region for region in filling.regions if region.name == name)
+    dead_ends = sum(mouths_of(one) < 2 for one in made)
+    with filling.timed("throats"):
+        throat = narrowest_throat(filling.of(name), outcome.infill, region)
+    return fluid_report(name, volume, wetted, len(made), dead_ends, throat)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from numbers import Integral
+from typing import Any
+
 from gyroid_cad.common.choices import BLOCK_KINDS, Kind
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import FieldLike, as_field
@@ -15,12 +19,33 @@ __all__ = [
     "percent_hint",
     "require_cell_size",
     "require_density",
+    "require_none_beside_lattice",
     "require_one",
     "require_sheet",
     "require_thickness",
+    "whole_cells",
 ]
 
 SHEET_KIND, *NETWORK_KINDS = BLOCK_KINDS[:3]
+_MOST_CELLS_ALONG = 1_000_000
+
+
+def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:
+    """Numbers of cells along x, y, z.
+
+    Raises
+    ------
+    ParameterError
+    """
+    accepted = f"three whole numbers, each from 1 to {_MOST_CELLS_ALONG}"
+    try:
+        counts = tuple(cells)
+    except TypeError:
+        raise ParameterError("cells", cells, accepted) from None
+    whole = all(isinstance(n, Integral) and not isinstance(n, bool) and 1 <= n <= _MOST_CELLS_ALONG for n in counts)
+    if len(counts) != 3 or not whole:
+        raise ParameterError("cells", cells, accepted)
+    return int(counts[0]), int(counts[1]), int(counts[2])
 
 
 def require_cell_size(cell_size: float) -> None:
@@ -123,3 +148,15 @@ def require_one(thickness: object, density: object) -> None:
     if (thickness is None) == (density is None):
         given = {"thickness": thickness, "density": density}
         raise ParameterError("thickness, density", given, "exactly one of the two")
+
+
+def require_none_beside_lattice(given: Mapping[str, Any]) -> None:
+    """Refuse what a lattice that is given has of its own.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, value in given.items():
+        if value is not None:
+            raise ParameterError(name, value, "none beside a lattice, which has its own")

@@ -124,7 +124,7 @@ class GyroidFill(Part):  # type: ignore[misc]
     ----------
     part : Part, Solid or Compound, optional
         In a builder, the part made so far if left out.
-    cell_size, thickness, density, kind, skin, openings, core
+    cell_size, thickness, density, kind, skin, openings, plug, core
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings may be faces of the part,
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
@@ -164,6 +164,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         *,
         skin: float | None = None,
         openings: Sequence[Any] = (),
+        plug: float | None = None,
         core: Any = None,
         mode: Mode = Mode.REPLACE,
         origin: Point | None = None,
@@ -203,6 +204,7 @@ class GyroidFill(Part):  # type: ignore[misc]
             material_density,
             skin=skin,
             openings=openings,
+            plug=plug,
             core=core,
             tolerance=tolerance,
             lattice=lattice,

@@ -131,6 +131,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    plug: float | None = None,
     core: Any = None,
     origin: Point | None = None,
     rotation: Point = (0.0, 0.0, 0.0),
@@ -157,8 +158,8 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
-    tolerance, lattice, surface, solids, partial, compact, \
+    cell_size, thickness, density, kind, skin, openings, plug, core, origin, rotation, fit, drop_islands, \
+    keep_islands, tolerance, lattice, surface, solids, partial, compact, \
     porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
@@ -197,6 +198,7 @@ def gyroid_fill(
         drop_islands,
         skin=skin,
         openings=[*openings, *selected],
+        plug=plug,
         core=core,
         tolerance=tolerance,
         lattice=lattice,

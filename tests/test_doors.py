@@ -85,6 +85,15 @@ class Made:
         return len(list(parts_of(self.shape, TopAbs_SOLID)))
 
     @property
+    def levels(self) -> set[tuple[float, float]]:
+        """Lowest and highest corners of each solid, along z."""
+        found = set()
+        for solid in parts_of(self.shape, TopAbs_SOLID):
+            z = [BRep_Tool.Pnt_s(TopoDS.Vertex_s(corner)).Z() for corner in parts_of(solid, TopAbs_VERTEX)]
+            found.add((round(min(z), 6), round(max(z), 6)))
+        return found
+
+    @property
     def faces(self) -> int:
         return len(list(parts_of(self.shape, TopAbs_FACE)))
 
@@ -188,6 +197,14 @@ WRITTEN = {
     ),
     "pcurves": Case({"file": "made.step", "pcurves": True}, lambda made, usual: b"=PCURVE(" in made.file.read_bytes()),
     "deviation": Case({"file": "made.stl", "deviation": 0.2}, sized),
+    "products": Case(
+        {"file": "made.step", "kind": "bodies", "products": True},
+        lambda made, usual: made.file.read_bytes().count(b"=NEXT_ASSEMBLY_USAGE_OCCURRENCE(") == 3,
+    ),
+    "regions": Case(
+        {"file": "made.stl", "kind": "bodies", "regions": "fluid-a", "deviation": 0.2},
+        lambda made, usual: b"endsolid wall_a" in made.file.read_bytes(),
+    ),
     "angle": Case({"file": "made.stl", "deviation": 0.5, "angle": 80}, sized),
     "check": Case(
         {"file": "made.brep", "check": True}, lambda made, usual: told(made, "largest tolerance", "closed, valid")
@@ -219,6 +236,7 @@ CASES: dict[str, dict[str, Case]] = {
         "fit": Case({"fit": "paper"}, lambda made, usual: told(made, "4.36e-03"), ("control points",)),
         "control points": Case({"control points": 6}, lambda made, usual: (made.poles, usual.poles) == (6, 4)),
         "trim": Case({"trim": "box"}, lambda made, usual: near(made.between_corners, 10, 1e-6) and made.solids == 1),
+        **{name: Case({**WRITTEN[name].given, "trim": "box"}, WRITTEN[name].look) for name in ("products", "regions")},
         "keep islands": Case({"trim": "box", "keep islands": True}, lambda made, usual: made.solids == 3),
         "kind": Case(
             {"trim": "box", "kind": "bodies"}, lambda made, usual: near(made.volume, 1000) and made.solids == 3
@@ -280,6 +298,10 @@ CASES: dict[str, dict[str, Case]] = {
         "openings": Case(
             {"skin": 0.5, "openings": [">Z"]},
             lambda made, usual: grown(made, usual) and made.volume < SIDE**3 - 0.7 * 3 * 3 * 3.5,
+        ),
+        "plug": Case(
+            {"kind": "bodies", "skin": 0.5, "openings": ["a:>Z", "b:<Z"], "plug": 1.0},
+            lambda made, usual: {(0, SIDE), (0, SIDE - 1), (1, SIDE)} <= made.levels,
         ),
         "core": Case(
             {"core": block_at(0.5, 3)},

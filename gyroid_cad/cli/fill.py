@@ -33,6 +33,7 @@ from gyroid_cad.cli.options import (
     output_option,
     printer_option,
     quiet_option,
+    regions_option,
     schema_option,
 )
 from gyroid_cad.cli.print_check import check_by
@@ -46,6 +47,7 @@ from gyroid_cad.common.formats import (
     format_of,
     listed_endings,
     require_formats,
+    require_regions,
     require_settings,
 )
 from gyroid_cad.common.memory import require_libraries
@@ -58,7 +60,7 @@ BREP, TRIANGLES = ROUTES
 BODIES, SURFACE = KINDS[-2:]
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
-    *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
+    *("kind", "skin", "plug", "core", "origin", "rotation", "drop_islands", "keep_islands"),
     *("fillet", "repair", "material_density", "partial"),
 )
 
@@ -113,6 +115,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "bodies for one fluid, as a:>Z or b:<X; may be repeated.",
 )
 @click.option(
+    "--plug",
+    type=float,
+    metavar="MM",
+    help="Where one fluid flows in, how thick the wall is that closes channels of the other; as the skin if left out.",
+)
+@click.option(
     "--core",
     metavar="FILE",
     shell_complete=file_paths,
@@ -143,6 +151,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
 @author_options
+@regions_option
 @deviation_option
 @angle_option
 @click.option("--element-size", type=float, metavar="MM", help="Length of the edges of tetrahedra, in files of meshes.")
@@ -211,7 +220,7 @@ def fill_command(
     elements = {name: given[name] for name in ("element_size", "elements_through", "order")}
     meshes = [path for path in output if format_of(path) in MESH_FORMATS]
     tetrahedra.require_elements(**elements, wanted=bool(meshes))
-    written = {**header, **limits}
+    written = {**header, **limits, "regions": given["regions"]}
     checked = None if printer is None else check_by(printer)
     settings["route"] = _route(part, given, output)
     if settings["route"] == TRIANGLES:
@@ -246,10 +255,9 @@ def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
         If it does not lead from the part, with what else is given, to the files.
     """
     formats = {format_of(path) for path in output}
-    route: Route = given["route"] or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
-    told_apart = [form for form in (*PART_FORMATS, *MESH_FORMATS) if form not in TRIANGLE_FORMATS]
-    if given["kind"] == BODIES:
-        require_formats(output, told_apart)
+    require_regions(given["kind"], output, given["regions"])
+    of_triangles = given["kind"] != BODIES and formats <= set(TRIANGLE_FORMATS)
+    route: Route = given["route"] or (TRIANGLES if of_triangles else BREP)
     if route == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         return route

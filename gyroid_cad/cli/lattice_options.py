@@ -44,7 +44,7 @@ PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
 # Of the files that "build" writes: other commands that take the same lattice pass over them.
 _BUILD_FLAGS = ("instances", "kernel_check", "check")
-_BUILD_KEYS = ("output", *HEADER_KEYS, "deviation", "angle", *_BUILD_FLAGS)
+_BUILD_KEYS = ("output", *HEADER_KEYS, "deviation", "angle", "regions", *_BUILD_FLAGS)
 # Keys that name files, which a command writes or reads: in the folder of the file that names them.
 _WRITTEN, _READ = ("output", "histogram", "screenshot"), ("part", "core", "printer")
 

@@ -109,6 +109,8 @@ _WRITTEN = (
     _row("author", **_WRITING),
     _row("organisation", **_WRITING),
     _row("pcurves", **_WRITING),
+    _row("products", **_WRITING),
+    _row("regions", **_WRITING),
     _row("deviation", **_WRITING),
     _row("angle", **_WRITING),
 )
@@ -156,6 +158,7 @@ FILL = (
     _row("kind"),
     _row("skin"),
     _row("openings", "--opening"),
+    _row("plug"),
     _row("core"),
     _row("fillet", **_NO_TRIANGLES),
     _row("solids", "--solid"),

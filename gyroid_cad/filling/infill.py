@@ -109,11 +109,14 @@ class Infill:
         """
         if not self.endless:
             return in_wall(self.wall, points)
+        return region.contains(self.offsets(points), self.half_thickness(points))
+
+    def half_thickness(self, points: Floats) -> Floats:
+        """Half of an endless lattice's wall at points of the part's space, in mm."""
         if self.grading.uniform:
-            return region.contains(self.offsets(points), np.full(len(points), self.max_thickness / 2))
+            return np.full(len(points), self.max_thickness / 2)
         own = self.frame.own(points)
-        half_thickness = self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2
-        return region.contains(self.offsets(points), half_thickness)
+        return np.asarray(self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2)
 
     def bounding(self, region: Region, patches: Integers) -> tuple[LatticeFaces, Booleans]:
         """Faces of some patches that bound a region, side walls too, and whether their normals point into it."""

@@ -32,6 +32,7 @@ __all__ = [
     "Regions",
     "checked_skin",
     "grams_of",
+    "kind_beside",
     "regions_of",
 ]
 
@@ -173,6 +174,19 @@ def _network(kind: Kind, cell_size: float, density: float, tube: TubeLaw) -> Reg
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)
     return Regions((region,), thickness=2 * abs(offset))
+
+
+def kind_beside(own: Kind | None, kind: Kind) -> Kind:
+    """Kind that is filled with a lattice of a kind of its own, if one is given; raises ParameterError.
+
+    >>> kind_beside("network-a", "sheet"), kind_beside("sheet", "bodies"), kind_beside(None, "channels")
+    ('network-a', 'bodies', 'channels')
+    """
+    if own in (None, SHEET, kind):
+        return kind
+    if kind != SHEET:
+        raise ParameterError("kind", kind, f"none beside a lattice whose own is {own}")
+    return own
 
 
 def grams_of(material_density: float) -> float:

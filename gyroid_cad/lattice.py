@@ -94,7 +94,7 @@ class Lattice(LatticeParameters, LatticeMeshes, LatticeProperties, HostShapes):
         Largest deviation in mm instead of ``fit`` or ``tolerance``, met by the fewest control points, 5 or more a side.
     kind : {"sheet", "network-a", "network-b", "channels", "bodies"}
         Of a lattice that is trimmed: the wall, or what :func:`~gyroid_cad.fill` makes of the block. A network's density
-        is its own.
+        is its own; where it varies, below a half.
 
     porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius : optional
         As of :class:`gyroid_cad.Design`: two of these and of ``cell_size``, ``thickness`` and ``density``, which then

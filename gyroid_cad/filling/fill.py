@@ -111,7 +111,7 @@ def fill(
         Whole wall in mm; of the wall that is left, or that the channels leave. As of :class:`gyroid_cad.Lattice`,
         with x, y and z places in the part's space.
     density : number or field, optional
-        Volume fraction instead: of the wall, or of the network, for which it is one number.
+        Volume fraction instead: of the wall, or of the network; where that varies, below a half.
     kind : {"sheet", "network-a", "network-b", "channels", "bodies", "surface"}
         The wall; one of the two networks it parts; both of them, the wall left out; the wall, both fluids and the skin,
         as bodies that share the faces between them; or the mid-surface alone. A lattice may have a kind of its own.

@@ -35,6 +35,7 @@ from gyroid_cad.wall.limits import (
     require_one,
     require_sheet,
     require_thickness,
+    wall_beside_network,
     whole_cells,
 )
 from gyroid_cad.wall.offset import Wall
@@ -234,7 +235,9 @@ class LatticeParameters:
         600.0
         """
         if not self.uniform:
-            return self._measures().volume
+            wall = self._measures().volume
+            # Of what the wall leaves either network has half, to second order in the gradient.
+            return (block_volume(self.cells, self.grading()) - wall) / 2 if self.network else wall
         return prod(self.cells) * self.volume_fraction * self.cell_size**3
 
     def spec(self) -> LatticeSpec:
@@ -266,7 +269,7 @@ class LatticeParameters:
         return Grading(
             self.cell_size,
             self.thickness,  # type: ignore[arg-type]
-            self.density,  # type: ignore[arg-type]
+            wall_beside_network(self.density) if self.network else self.density,  # type: ignore[arg-type]
             self.scale_field,  # type: ignore[arg-type]
             space,
             self.minimal_surface,

@@ -87,7 +87,7 @@ def author_options(function: Callable[..., Any]) -> Callable[..., Any]:
         "--products",
         is_flag=True,
         help="Write STEP with several bodies as an assembly of a product each, for programs that show the names of "
-        "products and none of solids, as FreeCAD and Gmsh do.",
+        "products and none of solids, as Gmsh does.",
     )(function)
     function = click.option(
         "--pcurves",

@@ -221,7 +221,7 @@ class Filled(HostShapes):
         ----------
         products : bool
             Of several bodies make each a product of an assembly in STEP files, for programs that show no names of
-            solids, as FreeCAD and Gmsh.
+            solids, as Gmsh does not.
         regions : {"all", "wall", "fluid-a", "fluid-b", "skin"}, optional
             Of bodies write STL as text, faces of each name as a region, as OpenFOAM's meshers take them: those of a
             body, which they close, or of all bodies, each face once and turned as the first body has it.

@@ -10,14 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import meshio
 import numpy as np
+import skfem
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
+from skfem.helpers import ddot, sym_grad, trace
+from skfem.io.meshio import from_meshio
 
 from gyroid_cad.common.arrays import freeze_arrays
-from gyroid_cad.errors import GyroidError
 from gyroid_cad.mesh.finite_elements.data import MeshData
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
@@ -67,24 +70,13 @@ def homogenised(mesh: MeshData, pairs: PeriodicPairs, volume: float, poisson_rat
     Returns
     -------
     EffectiveTensors
-
-    Raises
-    ------
-    GyroidError
-        If scikit-fem is not installed.
     """
-    try:
-        import meshio
-        import skfem
-        from skfem.io.meshio import from_meshio
-    except ModuleNotFoundError as missing:
-        raise GyroidError(f"effective properties need {missing.name}: pip install 'gyroid_cad[analysis]'") from None
     grid = from_meshio(meshio.Mesh(mesh.points, [("hexahedron27", mesh.cells)]))
     scalar = skfem.Basis(grid, skfem.ElementHex2(), intorder=_RULE)
     vector = scalar.with_element(skfem.ElementVector(skfem.ElementHex2()))
     own = _masters(mesh, pairs)
-    stiffness = _stiffness(skfem, vector, _periodic(vector, mesh, own, 3), poisson_ratio) / volume
-    conductivity = _conductivity(skfem, scalar, _periodic(scalar, mesh, own, 1)) / volume
+    stiffness = _stiffness(vector, _periodic(vector, mesh, own, 3), poisson_ratio) / volume
+    conductivity = _conductivity(scalar, _periodic(scalar, mesh, own, 1)) / volume
     return EffectiveTensors((stiffness + stiffness.T) / 2, (conductivity + conductivity.T) / 2)
 
 
@@ -114,9 +106,7 @@ def _periodic(basis: Any, mesh: MeshData, own: Integers, components: int) -> csr
     return csr_array((np.ones(len(rows)), (rows, kept[column[rows]])), shape=shape)
 
 
-def _stiffness(skfem: Any, basis: Any, periodic: csr_array, poisson_ratio: float) -> Floats:
-    from skfem.helpers import ddot, sym_grad, trace
-
+def _stiffness(basis: Any, periodic: csr_array, poisson_ratio: float) -> Floats:
     first = poisson_ratio / (1 + poisson_ratio) / (1 - 2 * poisson_ratio)
     shear = 1 / 2 / (1 + poisson_ratio)
     strains = np.zeros((6, 3, 3))
@@ -137,7 +127,7 @@ def _stiffness(skfem: Any, basis: Any, periodic: csr_array, poisson_ratio: float
     return _effective(skfem.BilinearForm(energy).assemble(basis), loads, periodic, uniform)
 
 
-def _conductivity(skfem: Any, basis: Any, periodic: csr_array) -> Floats:
+def _conductivity(basis: Any, periodic: csr_array) -> Floats:
     def energy(u: Any, v: Any, _: Any) -> Any:
         return np.sum(u.grad * v.grad, axis=0)
 

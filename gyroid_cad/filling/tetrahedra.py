@@ -205,7 +205,7 @@ def _best(surface: _Surface, size: float, order: int) -> tuple[SurfaceMesh, Volu
     for _ in range(_TRIES):
         one = _tried(surface, size, order)
         given_up += one.volume is None and not len(one.places)
-        if given_up > _MOST_GIVEN_UP:
+        if given_up > _MOST_GIVEN_UP or (one.problem and one.volume is not None and not len(one.places)):
             break
         if not one.problem:
             sound.append(one)

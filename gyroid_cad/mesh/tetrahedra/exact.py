@@ -32,7 +32,7 @@ _ROUNDS = 12
 # Of parameters' ranges, for derivatives; rounds towards the foot on a face, and towards where panels meet.
 _STEP, _FOOT_ROUNDS, _MEETING_ROUNDS = 1e-5, 2, 4
 # Squared sine of half the angle between panels that have no sure direction across their crease.
-_ALIKE = 1e-4
+_ALIKE = 3e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -41,7 +41,7 @@ _SLIM = 0.5
 # Of the way to the middle of what is round a vertex.
 _STEP = 0.7
 # Cosine of the angle between triangles that are all but folded on each other.
-_FOLDED = np.cos(np.radians(2.0))
+_FOLDED = np.cos(np.radians(0.5))
 
 
 def panels_round(mesh: SurfaceMesh, which: Integers) -> PanelPairs:

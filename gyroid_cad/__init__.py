@@ -42,8 +42,10 @@ if TYPE_CHECKING:
     from gyroid_cad.printing.printers import Printer
     from gyroid_cad.printing.verdict import PrintCheck
     from gyroid_cad.surface.fit import FitSettings
+    from gyroid_cad.wall.laws import Design, design
 
 __all__ = [
+    "Design",
     "ExportError",
     "Field",
     "FileCheck",
@@ -66,6 +68,7 @@ __all__ = [
     "VolumePatches",
     "__version__",
     "check_file",
+    "design",
     "fill",
     "mesh_quality",
     "print_check",
@@ -96,6 +99,7 @@ _HOMES = {
     "printing.printers": ("Printer",),
     "printing.verdict": ("PrintCheck",),
     "surface.fit": ("FitSettings",),
+    "wall.laws": ("Design", "design"),
 }
 _MOVED = {
     "builds.assembly": ("Assembly", "AssemblyReport"),

@@ -32,7 +32,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
     Parameters
     ----------
     cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact, \
-    kind
+    kind, porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     rotation : RotationLike
         Angles about the axes, in degrees.
@@ -62,7 +62,7 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
     def __init__(
         self,
         cells: tuple[int, int, int],
-        cell_size: float,
+        cell_size: float | None = None,
         thickness: FieldLike | None = None,
         density: FieldLike | None = None,
         fit: FitSettings | None = None,
@@ -78,10 +78,16 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
         keep_islands: bool = False,
         compact: float | None = None,
         kind: Kind = "sheet",
+        porosity: FieldLike | None = None,
+        pore_size: float | None = None,
+        throat: float | None = None,
+        hydraulic_diameter: float | None = None,
+        area_per_volume: float | None = None,
+        curvature_radius: float | None = None,
     ) -> None:
         self.lattice = Lattice(
             cells,
-            cell_size,
+            cell_size,  # type: ignore[arg-type]
             thickness,
             density,
             fit or FitSettings(),
@@ -93,6 +99,12 @@ class Gyroid(BasePartObject):  # type: ignore[misc]
             keep_islands=keep_islands,
             compact=compact,
             kind=kind,
+            porosity=porosity,
+            pore_size=pore_size,
+            throat=throat,
+            hydraulic_diameter=hydraulic_diameter,
+            area_per_volume=area_per_volume,
+            curvature_radius=curvature_radius,
         )
         # A solid where it is one, as the host's own objects begin: the place of a part would be lost in its ``locate``.
         part = Part.cast(self.lattice.solid())
@@ -112,13 +124,13 @@ class GyroidFill(Part):  # type: ignore[misc]
     ----------
     part : Part, Solid or Compound, optional
         In a builder, the part made so far if left out.
-    cell_size, thickness, density, kind, skin, openings, core
+    cell_size, thickness, density, kind, skin, openings, plug, core
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings may be faces of the part,
         such as ``part.faces().sort_by(Axis.Z)[-1:]``.
     mode : Mode
         In a builder, the filled part takes the place of what is there.
     origin, rotation, fit, drop_islands, keep_islands, material_density, tolerance, lattice, surface, solids, partial, \
-    compact
+    compact, porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius
         As of :func:`gyroid_cad.fill`.
 
     Attributes
@@ -152,6 +164,7 @@ class GyroidFill(Part):  # type: ignore[misc]
         *,
         skin: float | None = None,
         openings: Sequence[Any] = (),
+        plug: float | None = None,
         core: Any = None,
         mode: Mode = Mode.REPLACE,
         origin: Point | None = None,
@@ -166,6 +179,12 @@ class GyroidFill(Part):  # type: ignore[misc]
         solids: Sequence[str | int] = (),
         partial: bool = False,
         compact: float | None = None,
+        porosity: FieldLike | None = None,
+        pore_size: float | None = None,
+        throat: float | None = None,
+        hydraulic_diameter: float | None = None,
+        area_per_volume: float | None = None,
+        curvature_radius: float | None = None,
     ) -> None:
         # As the host's operations do, not as its objects: those are placed at the builder's locations.
         context: BuildPart | None = BuildPart._get_context("GyroidFill")
@@ -185,6 +204,7 @@ class GyroidFill(Part):  # type: ignore[misc]
             material_density,
             skin=skin,
             openings=openings,
+            plug=plug,
             core=core,
             tolerance=tolerance,
             lattice=lattice,
@@ -193,6 +213,12 @@ class GyroidFill(Part):  # type: ignore[misc]
             solids=solids,
             partial=partial,
             compact=compact,
+            porosity=porosity,
+            pore_size=pore_size,
+            throat=throat,
+            hydraulic_diameter=hydraulic_diameter,
+            area_per_volume=area_per_volume,
+            curvature_radius=curvature_radius,
         )
         self.report = filled.report
         self.mode = mode

@@ -32,7 +32,7 @@ Plane = TypeVar("Plane", bound=cq.Workplane)
 def gyroid(
     self: Plane,
     cells: tuple[int, int, int],
-    cell_size: float,
+    cell_size: float | None = None,
     thickness: FieldLike | None = None,
     density: FieldLike | None = None,
     fit: FitSettings | None = None,
@@ -48,13 +48,19 @@ def gyroid(
     keep_islands: bool = False,
     compact: float | None = None,
     kind: Kind = "sheet",
+    porosity: FieldLike | None = None,
+    pore_size: float | None = None,
+    throat: float | None = None,
+    hydraulic_diameter: float | None = None,
+    area_per_volume: float | None = None,
+    curvature_radius: float | None = None,
 ) -> Plane:
     """A lattice of the gyroid, or of another surface, at each point of the stack.
 
     Parameters
     ----------
     cells, cell_size, thickness, density, fit, scale_field, map, tolerance, trim, surface, keep_islands, compact, \
-    kind
+    kind, porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius
         As of :class:`gyroid_cad.Lattice`; lengths in mm.
     centered : bool or tuple of bool
         As of ``Workplane.box``: whether the middle of the lattice's bounding box, or its lowest corner,
@@ -83,7 +89,7 @@ def gyroid(
     """
     lattice = Lattice(
         cells,
-        cell_size,
+        cell_size,  # type: ignore[arg-type]
         thickness,
         density,
         fit or FitSettings(),
@@ -95,6 +101,12 @@ def gyroid(
         keep_islands=keep_islands,
         compact=compact,
         kind=kind,
+        porosity=porosity,
+        pore_size=pore_size,
+        throat=throat,
+        hydraulic_diameter=hydraulic_diameter,
+        area_per_volume=area_per_volume,
+        curvature_radius=curvature_radius,
     )
     low, high = lattice.bounding_box()
     per_axis = (centered,) * 3 if isinstance(centered, bool) else tuple(centered)
@@ -119,6 +131,7 @@ def gyroid_fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    plug: float | None = None,
     core: Any = None,
     origin: Point | None = None,
     rotation: Point = (0.0, 0.0, 0.0),
@@ -131,6 +144,12 @@ def gyroid_fill(
     solids: Sequence[str | int] = (),
     partial: bool = False,
     compact: float | None = None,
+    porosity: FieldLike | None = None,
+    pore_size: float | None = None,
+    throat: float | None = None,
+    hydraulic_diameter: float | None = None,
+    area_per_volume: float | None = None,
+    curvature_radius: float | None = None,
 ) -> Plane:
     """Fill the solid in the chain; what is left takes its place.
 
@@ -139,8 +158,9 @@ def gyroid_fill(
 
     Parameters
     ----------
-    cell_size, thickness, density, kind, skin, openings, core, origin, rotation, fit, drop_islands, keep_islands, \
-    tolerance, lattice, surface, solids, partial, compact
+    cell_size, thickness, density, kind, skin, openings, plug, core, origin, rotation, fit, drop_islands, \
+    keep_islands, tolerance, lattice, surface, solids, partial, compact, \
+    porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius
         As of :func:`gyroid_cad.fill`; lengths in mm, places in global coordinates. Openings join those selected.
 
     Returns
@@ -178,6 +198,7 @@ def gyroid_fill(
         drop_islands,
         skin=skin,
         openings=[*openings, *selected],
+        plug=plug,
         core=core,
         tolerance=tolerance,
         lattice=lattice,
@@ -186,6 +207,12 @@ def gyroid_fill(
         solids=solids,
         partial=partial,
         compact=compact,
+        porosity=porosity,
+        pore_size=pore_size,
+        throat=throat,
+        hydraulic_diameter=hydraulic_diameter,
+        area_per_volume=area_per_volume,
+        curvature_radius=curvature_radius,
     )
     for name, domain in made.domains.items():
         self.newObject([cq.Shape.cast(domain)]).tag(name)

@@ -6,19 +6,20 @@ import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gyroid_cad.builds.meshes import LatticeMeshes
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import BLOCK_KINDS, Schema
+from gyroid_cad.common.choices import BLOCK_KINDS, BodyName, Schema
 from gyroid_cad.common.formats import (
     BREP,
     TRIANGLE_FORMATS,
     format_of,
     require_assembly_formats,
     require_formats,
+    require_regions,
     require_settings,
 )
 from gyroid_cad.common.progress import Progress
@@ -92,7 +93,11 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         Largest deviation in mm instead of ``fit`` or ``tolerance``, met by the fewest control points, 5 or more a side.
     kind : {"sheet", "network-a", "network-b", "channels", "bodies"}
         Of a lattice that is trimmed: the wall, or what :func:`~gyroid_cad.fill` makes of the block. A network's density
-        is its own.
+        is its own; where it varies, below a half.
+
+    porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius : optional
+        As of :class:`gyroid_cad.Design`: two of these and of ``cell_size``, ``thickness`` and ``density``, which then
+        follow from them and are what the lattice keeps. Only a porosity beside a cell size may vary.
 
     Raises
     ------
@@ -153,7 +158,7 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> list(made.domains), round(sum(made.report.volumes.values()), 6)
         (['wall', 'fluid-a', 'fluid-b'], 1000.0)
         """
-        from gyroid_cad.filling.block import filled_block
+        from gyroid_cad.filling.fill import filled_block
 
         return filled_block(self, progress)
 
@@ -193,6 +198,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         author: str = "",
         organisation: str = "",
         pcurves: bool = False,
+        products: bool = False,
+        regions: BodyName | None = None,
     ) -> None:
         """Write files; each path's ending chooses STEP (packed too: .stpz, .step.gz), BREP, STL, 3MF, OBJ or PLY.
 
@@ -209,6 +216,10 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         pcurves : bool
             Write edges of STEP files with their curves in faces' parameters too, for receivers that do not make them:
             the kernel builds the solid, and files grow by half.
+        products : bool
+            Of several bodies make each a product of an assembly in STEP files.
+        regions : {"all", "wall", "fluid-a", "fluid-b"}, optional
+            Of the kind "bodies" write STL as text, faces of each name as a region: of a body, or of all, each once.
         deviation : float, optional
             Of the triangles in STL and 3MF from the faces, in mm; if left out, a thousandth of the cell size, or a
             tenth of the wall if that is less.
@@ -232,17 +243,23 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         >>> lattice = Lattice((1, 1, 1), 10, thickness=0.8)
         >>> lattice.write("cell.step", "cell.stl", deviation=0.1)
         """
-        targets, header = require_formats(paths), StepHeader(schema, author, organisation, pcurves)
+        targets, header = require_formats(paths), StepHeader(schema, author, organisation, pcurves, products)
         if deviation is not None:
             deviation = finite_number("deviation", deviation, "a length in mm, a finite number")
+        require_regions(self.kind, targets, regions)
         if instances:
             require_assembly_formats(targets)
+            if products:
+                raise ParameterError("products", products, "none with instances, whose cells are products already")
             require_settings((1, 1, 1), deviation, angle)
-            self.assembly(progress).write(*targets, **asdict(header), progress=progress)
+            plain = {name: value for name, value in asdict(header).items() if name != "products"}
+            self.assembly(progress).write(*targets, **plain, progress=progress)
             return
         if not self._of_wall:
+            require_settings((1, 1, 1), deviation, angle)
             made = self.filled(progress)
-            made.write(*targets, **asdict(header), deviation=deviation, angle=angle, progress=progress)
+            limits: dict[str, Any] = {"deviation": deviation, "angle": angle}
+            made.write(*targets, **asdict(header), **limits, regions=regions, progress=progress)
             return
         solid = [path for path in targets if self.needs_solid([path])]
         flat = [path for path in targets if path not in solid]
@@ -250,9 +267,8 @@ class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
         for path in targets:
             if format_of(path) in TRIANGLE_FORMATS:
                 require_near_origin(path, self.fitted(progress).bounding_box(), self.deviation(deviation))
-        by_kernel = (
-            solid if kernel_check or pcurves or self.trim or any(format_of(path) is BREP for path in solid) else []
-        )
+        asked = kernel_check or pcurves or products or self.trim
+        by_kernel = solid if asked or any(format_of(path) is BREP for path in solid) else []
         if by_kernel:
             self.built(progress).write(by_kernel, header, self.deviation(deviation), angle, progress)
         elif solid:

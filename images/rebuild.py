@@ -20,6 +20,7 @@ _SCRIPTS = (
     ("render_quality.py", None),
     ("render_stress.py", None),
     ("render_parts.py", "light_bracket.py"),
+    ("render_exchanger.py", "counter_flow_in_cadquery.py"),
     ("render_solutions.py", "isogeometric_heat.py"),
 )
 

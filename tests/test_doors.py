@@ -28,8 +28,9 @@ from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID, TopAbs_VERTEX
 from OCP.TopoDS import TopoDS
 from remembered import filled_once
 
-from gyroid_cad import FitError, IslandsWarning, Lattice, fill
+from gyroid_cad import Design, FitError, IslandsWarning, Lattice, design, fill
 from gyroid_cad.cli.app import commands, main
+from gyroid_cad.common.choices import TARGETS
 from gyroid_cad.common.doors import DOORS, FILL, LATTICE, Absent
 from gyroid_cad.filling import fill as filling
 from gyroid_cad.filling.filled import Filled
@@ -82,6 +83,15 @@ class Made:
     @property
     def solids(self) -> int:
         return len(list(parts_of(self.shape, TopAbs_SOLID)))
+
+    @property
+    def levels(self) -> set[tuple[float, float]]:
+        """Lowest and highest corners of each solid, along z."""
+        found = set()
+        for solid in parts_of(self.shape, TopAbs_SOLID):
+            z = [BRep_Tool.Pnt_s(TopoDS.Vertex_s(corner)).Z() for corner in parts_of(solid, TopAbs_VERTEX)]
+            found.add((round(min(z), 6), round(max(z), 6)))
+        return found
 
     @property
     def faces(self) -> int:
@@ -169,6 +179,12 @@ def corners_are_poles(text: str) -> bool:
     return bool(corners & set(re.findall(r"#\d+", "".join(re.findall(r"=B_SPLINE_CURVE[^;]*", text)))))
 
 
+def described_by(made: Design, look: Look, instead: str) -> dict[str, Case]:
+    """Cases of a lattice that is described by its pores, its area or its curvature beside its cell."""
+    names = {name.replace("_", " "): getattr(made, name) for name in TARGETS[1:]}
+    return {name: Case({name: value}, look, (instead,)) for name, value in names.items()}
+
+
 WRITTEN = {
     "file": Case({"file": "made.brep"}, lambda made, usual: read_brep(made.file).ShapeType() is not None),
     "schema": Case({"file": "made.step", "schema": "ap242"}, lambda made, usual: b"AP242" in made.file.read_bytes()),
@@ -181,6 +197,14 @@ WRITTEN = {
     ),
     "pcurves": Case({"file": "made.step", "pcurves": True}, lambda made, usual: b"=PCURVE(" in made.file.read_bytes()),
     "deviation": Case({"file": "made.stl", "deviation": 0.2}, sized),
+    "products": Case(
+        {"file": "made.step", "kind": "bodies", "products": True},
+        lambda made, usual: made.file.read_bytes().count(b"=NEXT_ASSEMBLY_USAGE_OCCURRENCE(") == 3,
+    ),
+    "regions": Case(
+        {"file": "made.stl", "kind": "bodies", "regions": "fluid-a", "deviation": 0.2},
+        lambda made, usual: b"endsolid wall_a" in made.file.read_bytes(),
+    ),
     "angle": Case({"file": "made.stl", "deviation": 0.5, "angle": 80}, sized),
     "check": Case(
         {"file": "made.brep", "check": True}, lambda made, usual: told(made, "largest tolerance", "closed, valid")
@@ -203,12 +227,16 @@ CASES: dict[str, dict[str, Case]] = {
         "thickness": Case({"thickness": 1.2}, lambda made, usual: near(made.volume / usual.volume, 1.5)),
         "density": Case({"density": 0.3}, lambda made, usual: near(made.volume, 300), ("thickness",)),
         "porosity": Case({"porosity": 0.7}, lambda made, usual: near(made.volume, 300), ("thickness",)),
+        **described_by(
+            design(cell_size=10, thickness=1.2), lambda made, usual: near(made.volume / usual.volume, 1.5), "thickness"
+        ),
         "surface": Case({"surface": "diamond"}, lambda made, usual: near(made.faces / usual.faces, 2, 0.5)),
         "tolerance": Case({"tolerance": 1e-4}, lambda made, usual: made.poles > usual.poles),
         "compact": Case({"compact": 3e-3}, lambda made, usual: made.poles == 6, ("control points",)),
         "fit": Case({"fit": "paper"}, lambda made, usual: told(made, "4.36e-03"), ("control points",)),
         "control points": Case({"control points": 6}, lambda made, usual: (made.poles, usual.poles) == (6, 4)),
         "trim": Case({"trim": "box"}, lambda made, usual: near(made.between_corners, 10, 1e-6) and made.solids == 1),
+        **{name: Case({**WRITTEN[name].given, "trim": "box"}, WRITTEN[name].look) for name in ("products", "regions")},
         "keep islands": Case({"trim": "box", "keep islands": True}, lambda made, usual: made.solids == 3),
         "kind": Case(
             {"trim": "box", "kind": "bodies"}, lambda made, usual: near(made.volume, 1000) and made.solids == 3
@@ -254,6 +282,9 @@ CASES: dict[str, dict[str, Case]] = {
         "thickness": Case({"thickness": 1.2}, grown, ("density",)),
         "density": Case({"density": 0.3}, lambda made, usual: near(made.volume, 0.3 * SIDE**3, 0.1)),
         "porosity": Case({"porosity": 0.7}, lambda made, usual: near(made.volume, 0.3 * SIDE**3, 0.1), ("density",)),
+        **described_by(
+            design(cell_size=CELL, density=0.3), lambda made, usual: near(made.volume, 0.3 * SIDE**3, 0.1), "density"
+        ),
         "surface": Case({"surface": "diamond"}, lambda made, usual: made.faces > usual.faces),
         "tolerance": Case(
             {"density": "0.2 + 0.005*x", "tolerance": 2e-5}, lambda made, usual: made.poles > 10, ("control points",)
@@ -267,6 +298,10 @@ CASES: dict[str, dict[str, Case]] = {
         "openings": Case(
             {"skin": 0.5, "openings": [">Z"]},
             lambda made, usual: grown(made, usual) and made.volume < SIDE**3 - 0.7 * 3 * 3 * 3.5,
+        ),
+        "plug": Case(
+            {"kind": "bodies", "skin": 0.5, "openings": ["a:>Z", "b:<Z"], "plug": 1.0},
+            lambda made, usual: {(0, SIDE), (0, SIDE - 1), (1, SIDE)} <= made.levels,
         ),
         "core": Case(
             {"core": block_at(0.5, 3)},

@@ -69,7 +69,7 @@ def test_an_example_runs_and_its_step_file_is_valid(
     printed = capsys.readouterr().out
     assert printed.strip()
     # What the README's commands filled is not filled again.
-    assert len(fills) <= example.read_text().count("fill(")
+    assert len(fills) <= example.read_text().lower().count("fill(")
     promised = re.findall(r'"(\w+\.\w+)"', example.read_text())
     assert sorted(path.name for path in folder.iterdir()) == sorted(promised)
     for path in folder.glob("*.step"):

@@ -63,7 +63,7 @@ def starred(package: str) -> set[str]:
 
 def test_a_star_imports_about_twenty_names_and_none_that_a_host_has() -> None:
     ours = starred("gyroid_cad")
-    assert 15 <= len(ours) <= 25
+    assert 15 <= len(ours) <= 27
     assert "Lattice" in ours
     assert not ours & (starred("cadquery") | starred("build123d"))
 

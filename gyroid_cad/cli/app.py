@@ -74,6 +74,7 @@ DONE = 0
 _MODULES = {
     "build": "build",
     "fill": "fill",
+    "design": "design",
     "mesh": "mesh",
     "volumes": "mesh",
     "view": "view",

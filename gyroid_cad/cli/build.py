@@ -23,6 +23,7 @@ from gyroid_cad.cli.options import (
     output_option,
     printer_option,
     quiet_option,
+    regions_option,
     schema_option,
 )
 from gyroid_cad.cli.print_check import check_by
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
     _Report = AssemblyReport | LatticeReport | TriangleReport | FillReport
 
 __all__ = ["build_command"]
+
+# Of what is written by the kernel alone.
+_BY_KERNEL = ("kernel_check", "pcurves", "products")
 
 
 @click.command("build")
@@ -58,6 +62,7 @@ __all__ = ["build_command"]
     is_flag=True,
     help="Have the kernel build and check the solid of .step too, as of .brep and of trimmed lattices.",
 )
+@regions_option
 @deviation_option
 @angle_option
 @check_option
@@ -92,14 +97,15 @@ def build_command(print_config: bool, as_json: bool, quiet: bool, **given: Any) 
         return
     outputs, printer = given["output"], given["printer"]
     checked = None if printer is None else check_by(printer)
-    settings = {name: given[name] for name in (*HEADER_KEYS, "deviation", "angle", "instances", "kernel_check")}
+    others = ("deviation", "angle", "regions", "instances", "kernel_check")
+    settings = {name: given[name] for name in (*HEADER_KEYS, *others)}
     with shown_progress(sys.stderr.isatty() and not quiet) as progress:
         lattice.write(*outputs, **settings, progress=progress)
         report: _Report
         if given["instances"]:
             report = lattice.assembly_report(progress)
         elif lattice.needs_solid(outputs):
-            by_kernel = given["kernel_check"] or given["pcurves"] or any(format_of(path) is BREP for path in outputs)
+            by_kernel = any(given[name] for name in _BY_KERNEL) or any(format_of(path) is BREP for path in outputs)
             report = lattice.report(progress, by_kernel)
         else:
             report = lattice.triangle_report(given["deviation"], progress)

@@ -13,14 +13,12 @@ from gyroid_cad.cli.check import checked_files, print_made
 from gyroid_cad.cli.console import shown_progress
 from gyroid_cad.cli.lattice_options import (
     PAPER_OPTIONS,
-    density_of,
+    described_by,
     fit_of,
     infill_options,
     lattice_of,
     listed,
     printed_options,
-    require_given,
-    require_one_wall,
     take_defaults,
 )
 from gyroid_cad.cli.options import (
@@ -35,6 +33,7 @@ from gyroid_cad.cli.options import (
     output_option,
     printer_option,
     quiet_option,
+    regions_option,
     schema_option,
 )
 from gyroid_cad.cli.print_check import check_by
@@ -48,6 +47,7 @@ from gyroid_cad.common.formats import (
     format_of,
     listed_endings,
     require_formats,
+    require_regions,
     require_settings,
 )
 from gyroid_cad.common.memory import require_libraries
@@ -60,7 +60,7 @@ BREP, TRIANGLES = ROUTES
 BODIES, SURFACE = KINDS[-2:]
 # Of the part and of how it is filled, whatever lattice fills it.
 _OWN = (
-    *("kind", "skin", "core", "origin", "rotation", "drop_islands", "keep_islands"),
+    *("kind", "skin", "plug", "core", "origin", "rotation", "drop_islands", "keep_islands"),
     *("fillet", "repair", "material_density", "partial"),
 )
 
@@ -115,6 +115,12 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     "bodies for one fluid, as a:>Z or b:<X; may be repeated.",
 )
 @click.option(
+    "--plug",
+    type=float,
+    metavar="MM",
+    help="Where one fluid flows in, how thick the wall is that closes channels of the other; as the skin if left out.",
+)
+@click.option(
     "--core",
     metavar="FILE",
     shell_complete=file_paths,
@@ -145,6 +151,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
 @click.option("--material-density", type=float, metavar="G/CM3", help="For the masses in the report.")
 @schema_option
 @author_options
+@regions_option
 @deviation_option
 @angle_option
 @click.option("--element-size", type=float, metavar="MM", help="Length of the edges of tetrahedra, in files of meshes.")
@@ -213,7 +220,7 @@ def fill_command(
     elements = {name: given[name] for name in ("element_size", "elements_through", "order")}
     meshes = [path for path in output if format_of(path) in MESH_FORMATS]
     tetrahedra.require_elements(**elements, wanted=bool(meshes))
-    written = {**header, **limits}
+    written = {**header, **limits, "regions": given["regions"]}
     checked = None if printer is None else check_by(printer)
     settings["route"] = _route(part, given, output)
     if settings["route"] == TRIANGLES:
@@ -248,10 +255,9 @@ def _route(part: str, given: dict[str, Any], output: Sequence[str]) -> Route:
         If it does not lead from the part, with what else is given, to the files.
     """
     formats = {format_of(path) for path in output}
-    route: Route = given["route"] or (TRIANGLES if formats <= set(TRIANGLE_FORMATS) else BREP)
-    told_apart = [form for form in (*PART_FORMATS, *MESH_FORMATS) if form not in TRIANGLE_FORMATS]
-    if given["kind"] == BODIES:
-        require_formats(output, told_apart)
+    require_regions(given["kind"], output, given["regions"])
+    of_triangles = given["kind"] != BODIES and formats <= set(TRIANGLE_FORMATS)
+    route: Route = given["route"] or (TRIANGLES if of_triangles else BREP)
     if route == TRIANGLES:
         require_formats(output, TRIANGLE_FORMATS)
         return route
@@ -295,11 +301,8 @@ def _settings(given: dict[str, Any]) -> dict[str, Any]:
         raise click.UsageError(
             f"give {listed(['cells'])} with {listed(of_blocks)}: only a block of cells is scaled or mapped"
         )
-    require_given(given, "cell_size")
-    if given["kind"] != "surface":
-        require_one_wall(given)
-    endless = {name: given[name] for name in ("cell_size", "thickness", "tolerance", "surface", "compact")}
-    return {**own, **endless, "density": density_of(given), "fit": fit_of(given)}
+    endless = {name: given[name] for name in ("tolerance", "surface", "compact")}
+    return {**own, **endless, **described_by(given, bare=given["kind"] == SURFACE), "fit": fit_of(given)}
 
 
 def _face(opening: str) -> str | list[float] | tuple[str, list[float]]:

@@ -10,7 +10,7 @@ import click
 from gyroid_cad.cli.config import Config, printed_config, read_config
 from gyroid_cad.cli.messages import config_of, label, remember_config
 from gyroid_cad.cli.options import HEADER_KEYS, Decorator, file_paths
-from gyroid_cad.common.choices import BLOCK_KINDS, FITS, SURFACE_NAMES, TRIMS
+from gyroid_cad.common.choices import BLOCK_KINDS, FITS, SURFACE_NAMES, TARGETS, TRIMS
 from gyroid_cad.common.formats import TOML, format_of
 from gyroid_cad.errors import ParameterError
 
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PAPER_OPTIONS",
-    "density_of",
+    "TARGET_OPTIONS",
+    "described_by",
     "fit_of",
     "infill_options",
     "lattice_of",
@@ -30,12 +31,12 @@ __all__ = [
     "options_given",
     "printed_options",
     "require_given",
-    "require_one_wall",
     "take_defaults",
 ]
 
 _WALL_OPTIONS = ("thickness", "density", "porosity")
-_OWN_OPTIONS = (*_WALL_OPTIONS, "scale_field", "cell_size", "map")
+_SOLVED_OPTIONS = TARGETS[1:]
+_OWN_OPTIONS = (*_WALL_OPTIONS, *_SOLVED_OPTIONS, "scale_field", "cell_size", "map")
 # Of a block of cells that is built. One that fills a part is placed and cut by the filling.
 _CUT_OPTIONS, _PLACE_OPTIONS = ("trim", "keep_islands", "kind"), ("origin", "rotation")
 PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
@@ -43,7 +44,7 @@ PAPER_OPTIONS = ("thickness_factor", "bc_length", "scale")
 _NO_KEYS = {"config", "print_config", "as_json", "quiet", "allow_outside"}
 # Of the files that "build" writes: other commands that take the same lattice pass over them.
 _BUILD_FLAGS = ("instances", "kernel_check", "check")
-_BUILD_KEYS = ("output", *HEADER_KEYS, "deviation", "angle", *_BUILD_FLAGS)
+_BUILD_KEYS = ("output", *HEADER_KEYS, "deviation", "angle", "regions", *_BUILD_FLAGS)
 # Keys that name files, which a command writes or reads: in the folder of the file that names them.
 _WRITTEN, _READ = ("output", "histogram", "screenshot"), ("part", "core", "printer")
 
@@ -114,6 +115,17 @@ surface_option = click.option(
 porosity_option = click.option(
     "--porosity", metavar="P", help="Empty part of the volume instead: 1 - density; may be an expression too."
 )
+# Two of these, and of cell size, thickness and density, describe a lattice that is uniform.
+TARGET_OPTIONS = tuple(
+    click.option(name, type=float, metavar=unit, help=meaning)
+    for name, unit, meaning in (
+        ("--pore-size", "MM", "Diameter of the largest sphere in the pores. Any two of these describe a lattice."),
+        ("--throat", "MM", "Diameter of the largest sphere that can travel through the pores."),
+        ("--hydraulic-diameter", "MM", "Of the pores: four times their volume by their area."),
+        ("--area-per-volume", "1/MM", "Area of all faces by the volume of the lattice."),
+        ("--curvature-radius", "MM", "The smallest of the faces."),
+    )
+)
 _INFILL_OPTIONS = (
     surface_option,
     click.option(
@@ -130,6 +142,7 @@ _INFILL_OPTIONS = (
         help="Volume fraction instead of thickness, below 0.94033; may be an expression too.",
     ),
     porosity_option,
+    *TARGET_OPTIONS,
     click.option(
         "--scale-field",
         metavar="EXPRESSION",
@@ -290,43 +303,25 @@ def lattice_of(given: dict[str, Any]) -> Lattice:
         units = {name: given[name] for name in PAPER_OPTIONS if given[name] is not None}
         common = {name: given[name] for name in ("tolerance", "surface", "compact")}
         return Lattice.paper(given["cells"], **units, fit=fit, **common, **place)
-    require_given(given, "cell_size")
-    require_one_wall(given)
-    own = {name: given[name] for name in ("thickness", "scale_field", "map", "tolerance", "surface", "compact")}
-    return Lattice(given["cells"], given["cell_size"], density=density_of(given), **own, **cut, **place, fit=fit)
+    described = described_by(given)
+    own = {name: given[name] for name in ("scale_field", "map", "tolerance", "surface", "compact")}
+    return Lattice(given["cells"], **described, **own, **cut, **place, fit=fit)
 
 
-def require_one_wall(given: dict[str, Any]) -> None:
-    """Refuse a wall that is described twice, or not at all.
+def described_by(given: dict[str, Any], bare: bool = False) -> dict[str, Any]:
+    """Cell size, wall, pores and whatever else is given of these.
 
     Raises
     ------
     click.UsageError
+        If a wall is described twice, or not at all unless it is of the bare surface; or there is no cell size.
     """
-    named = [name for name in _WALL_OPTIONS if given[name] is not None]
-    if len(named) != 1:
-        raise click.UsageError(f"give exactly one of {listed(named or _WALL_OPTIONS)}")
-
-
-def density_of(given: dict[str, Any]) -> Any:
-    """The density, whichever of it and the porosity was given; None if neither was.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if given["porosity"] is None:
-        return given["density"]
-    from gyroid_cad.fields.field import as_field
-    from gyroid_cad.wall.limits import percent_hint
-
-    porosity = as_field("porosity", given["porosity"], "a volume fraction")
-    if not isinstance(porosity, float):
-        return 1 - porosity
-    if not 0 < porosity < 1:
-        raise ParameterError("porosity", porosity, "above 0 and below 1" + percent_hint(porosity))
-    # So that 0.7 is the density 0.3, to the last bit.
-    return round(1 - porosity, 15)
+    if all(given[name] is None for name in _SOLVED_OPTIONS):
+        require_given(given, "cell_size")
+        named = [name for name in _WALL_OPTIONS if given[name] is not None]
+        if len(named) != 1 and not (bare and not named):
+            raise click.UsageError(f"give exactly one of {listed(named or _WALL_OPTIONS)}")
+    return {name: given[name] for name in ("cell_size", "thickness", "density", *TARGETS)}
 
 
 def require_given(given: dict[str, Any], name: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from gyroid_cad.common.choices import SCHEMAS
+from gyroid_cad.common.choices import BODY_NAMES, SCHEMAS
 from gyroid_cad.version import __version__
 
 __all__ = [
@@ -23,12 +23,13 @@ __all__ = [
     "output_option",
     "printer_option",
     "quiet_option",
+    "regions_option",
     "schema_option",
     "version_option",
 ]
 
 # Of the headers of STEP files.
-HEADER_KEYS = ("schema", "author", "organisation", "pcurves")
+HEADER_KEYS = ("schema", "author", "organisation", "pcurves", "products")
 Declared = TypeVar("Declared", bound=Callable[..., object])
 
 
@@ -83,6 +84,12 @@ schema_option = click.option(
 def author_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the options of by whom a STEP file is, and what else it holds."""
     function = click.option(
+        "--products",
+        is_flag=True,
+        help="Write STEP with several bodies as an assembly of a product each, for programs that show the names of "
+        "products and none of solids, as Gmsh does.",
+    )(function)
+    function = click.option(
         "--pcurves",
         is_flag=True,
         help="Write STEP with edges' curves in the parameters of faces too: half as large again.",
@@ -94,6 +101,13 @@ def author_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
+regions_option = click.option(
+    "--regions",
+    type=click.Choice(BODY_NAMES),
+    metavar="BODY",
+    help="Write .stl of bodies as text, faces of each name as a region, as meshers of OpenFOAM take them: those of "
+    "wall, fluid-a, fluid-b or skin, or of all, each face once.",
+)
 deviation_option = click.option(
     "--deviation",
     type=float,

@@ -12,13 +12,16 @@ from typing import Literal, get_args
 
 __all__ = [
     "BLOCK_KINDS",
+    "BODY_NAMES",
     "FITS",
     "KINDS",
     "PROFILES",
     "ROUTES",
     "SCHEMAS",
     "SURFACE_NAMES",
+    "TARGETS",
     "TRIMS",
+    "BodyName",
     "CheckedBy",
     "FitName",
     "Kind",
@@ -30,6 +33,8 @@ __all__ = [
 ]
 
 Kind = Literal["sheet", "network-a", "network-b", "channels", "bodies", "surface"]
+# Of bodies that share their faces: whose are written as regions of an STL file.
+BodyName = Literal["all", "wall", "fluid-a", "fluid-b", "skin"]
 SurfaceName = Literal["gyroid", "diamond", "primitive"]
 Trim = Literal["box"]
 # To a filled part: through exact solids, or through triangles alone.
@@ -51,4 +56,7 @@ TRIMS: tuple[Trim, ...] = get_args(Trim)
 SCHEMAS: tuple[Schema, ...] = get_args(Schema)
 ROUTES: tuple[Route, ...] = get_args(Route)
 PROFILES: tuple[Profile, ...] = get_args(Profile)
+BODY_NAMES: tuple[BodyName, ...] = get_args(BodyName)
+# What else than cell size, thickness and density may describe a lattice.
+TARGETS = ("porosity", "pore_size", "throat", "hydraulic_diameter", "area_per_volume", "curvature_radius")
 FITS: tuple[FitName, ...] = get_args(FitName)

@@ -76,7 +76,6 @@ def _shell_alone(option: str, reason: str) -> Row:
 
 
 _FIT = _but_python("in `fit`, a `FitSettings`")
-_COMPLEMENT = _but_python("`density=1 - porosity`")
 _WRITING = _but_hosts("the host's exporters write")
 _MESHED = _but_hosts("the host's shapes hold no elements: `gyroid_cad.fill(...).mesh()`")
 _NO_PROGRESS = _but_hosts("the host's methods show none")
@@ -91,7 +90,12 @@ _WALL = (
     _row("cell size"),
     _row("thickness"),
     _row("density"),
-    _row("porosity", **_COMPLEMENT),
+    _row("porosity"),
+    _row("pore size"),
+    _row("throat"),
+    _row("hydraulic diameter"),
+    _row("area per volume"),
+    _row("curvature radius"),
     _row("surface"),
     _row("tolerance"),
     _row("compact"),
@@ -105,6 +109,8 @@ _WRITTEN = (
     _row("author", **_WRITING),
     _row("organisation", **_WRITING),
     _row("pcurves", **_WRITING),
+    _row("products", **_WRITING),
+    _row("regions", **_WRITING),
     _row("deviation", **_WRITING),
     _row("angle", **_WRITING),
 )
@@ -152,6 +158,7 @@ FILL = (
     _row("kind"),
     _row("skin"),
     _row("openings", "--opening"),
+    _row("plug"),
     _row("core"),
     _row("fillet", **_NO_TRIANGLES),
     _row("solids", "--solid"),

@@ -14,7 +14,7 @@ from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 
-from gyroid_cad.common.choices import SCHEMAS, Schema
+from gyroid_cad.common.choices import BODY_NAMES, KINDS, SCHEMAS, BodyName, Kind, Schema
 from gyroid_cad.common.files import require_distinct, require_writable
 from gyroid_cad.common.memory import require_memory
 from gyroid_cad.errors import ParameterError
@@ -57,10 +57,14 @@ __all__ = [
     "require_formats",
     "require_meshing",
     "require_output",
+    "require_regions",
     "require_schema",
     "require_settings",
     "stem_of",
 ]
+
+# Whose faces have names, and are shared.
+_BODIES = KINDS[-2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,3 +297,26 @@ def require_assembly_formats(targets: Sequence[Path]) -> None:
     """
     for path in targets:
         require_format("output", path, [STEP], "an assembly: a file name ending in ")
+
+
+def require_regions(kind: Kind, targets: Sequence[str | os.PathLike[str]], regions: BodyName | None) -> None:
+    """Check that triangles are of no bodies that share faces, unless STL is to have these in regions by their names.
+
+    Raises
+    ------
+    ParameterError
+    """
+    of_triangles = [path for path in targets if format_of(path) in TRIANGLE_FORMATS]
+    if regions is None:
+        if kind == _BODIES and of_triangles:
+            accepted = "STEP or BREP, which tell bodies that share faces apart, or .stl in regions"
+            raise ParameterError("output", str(of_triangles[0]), accepted)
+        return
+    if kind != _BODIES:
+        raise ParameterError("regions", regions, f"none but of the kind {_BODIES}, whose faces have names")
+    if regions not in BODY_NAMES:
+        raise ParameterError("regions", regions, " or ".join(BODY_NAMES))
+    for path in of_triangles:
+        require_format("output", path, [STL], "a file that can hold regions, ending in ")
+    if not of_triangles:
+        raise ParameterError("regions", regions, "a file ending in .stl to write them into")

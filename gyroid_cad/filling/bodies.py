@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,8 @@ from gyroid_cad.filling.wanted import SKIN, WALL
 from gyroid_cad.kernel.check import faces_of
 from gyroid_cad.kernel.compat import NumberedShapes
 from gyroid_cad.kernel.crossed import FaceSizes
-from gyroid_cad.kernel.shells import fused_solids
+from gyroid_cad.kernel.depth import NamedFaces
+from gyroid_cad.kernel.shells import connected_shells, fused_solids
 from gyroid_cad.kernel.skin import Hollow
 from gyroid_cad.kernel.solid import KernelFace, KernelShape
 from gyroid_cad.kernel.split import Pieces
@@ -22,9 +24,11 @@ from gyroid_cad.trim.islands import SMALL_ISLAND
 from gyroid_cad.trim.measures import PieceMeasures
 from gyroid_cad.wall.areas import ShapeSize
 
-__all__ = ["Crossed", "FaceNames", "Made", "made_of", "merged_chips"]
+__all__ = ["Crossed", "FaceNames", "Made", "made_of", "merged_chips", "mouths_of", "with_own_names"]
 
 Floats = NDArray[np.float64]
+# End of the name of a face that lies on the part's boundary.
+_PART_OWN = re.compile(r"(/|:)(face \d+|opening \d+|\d+|outside)$")
 # Solids by the name of what they are.
 Bodies = dict[str, list[KernelShape]]
 
@@ -148,6 +152,38 @@ def made_of(solid: KernelShape, names: tuple[str, ...], sizes: FaceSizes) -> Mad
     size, areas = sizes.of(solid), sizes.areas(solid)
     wetted = [name.split("/")[0] in (WALL, SKIN) for name in names]
     return Made(solid, size.volume, size.area, size.centroid, names, float(areas[wetted].sum()))
+
+
+def mouths_of(made: Made) -> int:
+    """Count the mouths of a fluid's body: the openings of a skin that it comes to, or else faces that are connected.
+
+    Parameters
+    ----------
+    made : Made
+        With the names of its faces.
+    """
+    ends = [name.split("/")[0] not in (WALL, SKIN) for name in made.face_names]
+    named = {name for name, is_end in zip(made.face_names, ends, strict=True) if is_end}
+    if not all("/face " in name for name in named):
+        return len(named)
+    return len(connected_shells([face for face, is_end in zip(faces_of(made.shape), ends, strict=True) if is_end]))
+
+
+def with_own_names(made: Made, own: NamedFaces) -> tuple[str, ...]:
+    """Names of a body's faces, where they lie on the part's own by the names that those have in its file.
+
+    What is told before them, the body or the fluid of a mouth, stays.
+    """
+    if not own or not made.face_names:
+        return made.face_names
+    return tuple(
+        _renamed(called, own.name_of(face) if _PART_OWN.search(called) else None)
+        for face, called in zip(faces_of(made.shape), made.face_names, strict=True)
+    )
+
+
+def _renamed(called: str, own: str | None) -> str:
+    return called if own is None else _PART_OWN.sub(lambda found: found.group(1) + own, called)
 
 
 def merged_chips(bodies: Bodies, volume_of: Callable[[KernelShape], float], one_cell: float) -> Bodies:

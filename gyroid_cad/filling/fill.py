@@ -3,46 +3,63 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
-from gyroid_cad.common.choices import Kind, Route, SurfaceName
+from gyroid_cad.common.cache import Cache
+from gyroid_cad.common.choices import TARGETS, Kind, Route, SurfaceName
 from gyroid_cad.common.progress import Progress, named_progress, report_progress
 from gyroid_cad.errors import ParameterError, PartWarning
 from gyroid_cad.fields.field import FieldLike
-from gyroid_cad.filling.bodies import Made
+from gyroid_cad.filling.bodies import with_own_names
 from gyroid_cad.filling.distance_skin import Shell
 from gyroid_cad.filling.filled import Filled
 from gyroid_cad.filling.fillet import checked_fillet
 from gyroid_cad.filling.forecast import require_cover
 from gyroid_cad.filling.infill import Foreseen, InfillIn, described_infill
 from gyroid_cad.filling.part import FilledBy, Filling, Outcome, bodies_of, part_of, without_specks
-from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, open_faces, require_of_bodies
-from gyroid_cad.filling.report import FillReport, FluidReport, fluid_report, joint_report, warn_of_uncovered
+from gyroid_cad.filling.ports import ANY, OpenFaces, PortedFilling, checked_plug, open_faces, require_of_bodies
+from gyroid_cad.filling.report import FillReport, joint_report, warn_of_uncovered
+from gyroid_cad.filling.throats import fluid_of
 from gyroid_cad.filling.triangle_part import naming_triangles, require_route
 from gyroid_cad.filling.triangles import TRIANGLES, TriangleJob
-from gyroid_cad.filling.wanted import BODIES, NETWORK_A, NETWORK_B, SHEET, SURFACE, Region, checked_skin, grams_of
+from gyroid_cad.filling.wanted import (
+    BODIES,
+    NETWORK_A,
+    NETWORK_B,
+    SHEET,
+    SURFACE,
+    Region,
+    checked_skin,
+    grams_of,
+    kind_beside,
+)
 from gyroid_cad.kernel.check import compound_of, topology
+from gyroid_cad.kernel.depth import NamedFaces
+from gyroid_cad.kernel.extent import solid_of_box
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.kernel.skin import Hollow, hollow_round
 from gyroid_cad.kernel.skin import hollow as hollowed
 from gyroid_cad.kernel.solid import KernelFace
 from gyroid_cad.surface.families import surface_named
 from gyroid_cad.surface.fit import FitSettings
+from gyroid_cad.trim.box import Box
 from gyroid_cad.trim.clearance import NearMisses, clear_frame
 from gyroid_cad.trim.islands import Islands, SealedVoid, island_rule, warn_caller, warn_of_voids, without_islands
 from gyroid_cad.wall.covering import frame_of, placement
 from gyroid_cad.wall.fitted import Closeness, valid_tolerance
+from gyroid_cad.wall.laws import wall_from
+from gyroid_cad.wall.limits import require_none_beside_lattice
 from gyroid_cad.wall.parameters import LatticeParameters
 
-__all__ = ["fill"]
+__all__ = ["fill", "filled_block"]
 
-Floats = NDArray[np.float64]
+# Blocks that were filled last.
+_blocks: Cache[Hashable, Filled] = Cache()
 
 
 def fill(
@@ -60,6 +77,7 @@ def fill(
     *,
     skin: float | None = None,
     openings: Sequence[Any] = (),
+    plug: float | None = None,
     core: Any = None,
     fillet: float | None = None,
     tolerance: float | None = None,
@@ -72,6 +90,12 @@ def fill(
     deviation: float | None = None,
     repair: bool = False,
     compact: float | None = None,
+    porosity: FieldLike | None = None,
+    pore_size: float | None = None,
+    throat: float | None = None,
+    hydraulic_diameter: float | None = None,
+    area_per_volume: float | None = None,
+    curvature_radius: float | None = None,
 ) -> Filled:
     """Fill a part with gyroid, or another surface's lattice: what is left is one exact B-rep, closed and valid.
 
@@ -87,7 +111,7 @@ def fill(
         Whole wall in mm; of the wall that is left, or that the channels leave. As of :class:`gyroid_cad.Lattice`,
         with x, y and z places in the part's space.
     density : number or field, optional
-        Volume fraction instead: of the wall, or of the network, for which it is one number.
+        Volume fraction instead: of the wall, or of the network; where that varies, below a half.
     kind : {"sheet", "network-a", "network-b", "channels", "bodies", "surface"}
         The wall; one of the two networks it parts; both of them, the wall left out; the wall, both fluids and the skin,
         as bodies that share the faces between them; or the mid-surface alone. A lattice may have a kind of its own.
@@ -110,6 +134,9 @@ def fill(
         Where the skin is left open, so that resin or powder can leave: faces of the part, selectors such as ">Z" for
         the faces furthest that way, or points (x, y, z), each for the face next to it. Of bodies each may name the
         fluid it is for, as in "a:>Z" or ("a", face): the channels of the other end at the skin there.
+    plug : float, optional
+        Thickness in mm of the wall at which they end there, from the skin's, which it is if left out, to a cell's size;
+        more than the skin's where faces are flat.
     core : shape, Workplane or path-like, optional
         Instead of a skin's thickness, the inner solid that is filled, as of ``part``: the skin is the part less the
         core, open wherever the core comes to the part's boundary.
@@ -138,6 +165,9 @@ def fill(
         Close a part of triangles that is open, at that route; the report says what was done.
     compact : float, optional
         Instead of ``tolerance`` or ``fit``, largest deviation in mm, met by as few control points as can be.
+    porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius : optional
+        Two of these and of ``cell_size``, ``thickness`` and ``density``, as of :class:`gyroid_cad.Lattice`; of channels
+        and bodies the wall's.
 
     Returns
     -------
@@ -159,7 +189,12 @@ def fill(
     >>> abs(filled.report.density - 0.3) < 0.01
     True
     """
-    kind = _kind_beside(lattice, kind)
+    kind = kind_beside(None if lattice is None else lattice.kind, kind)
+    values = (porosity, pore_size, throat, hydraulic_diameter, area_per_volume, curvature_radius)
+    targets = {name: value for name, value in zip(TARGETS, values, strict=True) if value is not None}
+    if lattice is not None:
+        require_none_beside_lattice(targets)
+    cell_size, thickness, density = wall_from(surface, kind, cell_size, thickness, density, targets)
     frame = frame_of(*placement((0.0, 0.0, 0.0) if origin is None else origin, rotation))
     grams = None if material_density is None else grams_of(material_density)
     shell = checked_skin(skin, openings, core, kind)
@@ -172,6 +207,7 @@ def fill(
     regions, size, settings, foreseen, infill_in = described_infill(
         kind, cell_size, thickness, density, closeness, lattice, chosen, partial
     )
+    stopped = checked_plug(plug, shell, openings, size)
     if route == TRIANGLES:
         cover = functools.partial(require_cover, cell_size=size, control_points=settings.control_points)
         given = (cover if lattice is None else None, frame, rule, grams, deviation, progress)
@@ -186,7 +222,7 @@ def fill(
     for remark in remarks:
         warn_caller(remark, PartWarning)
     naming = [functools.partial(naming_triangles, kind, name if len(parts) > 1 else "") for name, _ in parts]
-    wanted = _Wanted(kind, regions, size, shell, core, infill_in, foreseen)
+    wanted = _Wanted(kind, regions, size, shell, stopped, core, infill_in, foreseen)
     fillings, made, islands = [], [], Islands()
     for (name, whole), faces, named in zip(parts, open_faces(parts, openings), naming, strict=True):
         with named():
@@ -216,12 +252,28 @@ def fill(
     return together
 
 
-def _kind_beside(lattice: LatticeParameters | None, kind: Kind) -> Kind:
-    if lattice is None or lattice.kind in (SHEET, kind):
-        return kind
-    if kind != SHEET:
-        raise ParameterError("kind", kind, f"none beside a lattice whose own is {lattice.kind}")
-    return lattice.kind
+def filled_block(lattice: LatticeParameters, progress: Progress | None = None) -> Filled:
+    """The block of cells of a lattice as the box that it is, filled with the lattice; the last few are remembered.
+
+    Parameters
+    ----------
+    lattice : LatticeParameters
+        Trimmed.
+    progress : callable, optional
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    ParameterError, SelfIntersectionError, FitError, KernelError
+    """
+
+    def made() -> Filled:
+        axes, origin = lattice.spec().frame.rotation, lattice.spec().frame.origin
+        low = origin @ axes
+        box = Box(axes, low, low + np.array(lattice.cells) * lattice.cell_size)
+        return fill(solid_of_box(box), lattice=lattice, keep_islands=lattice.keep_islands, progress=progress)
+
+    return _blocks.get((lattice.spec(), lattice.kind, lattice.density), made)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,6 +284,7 @@ class _Wanted:
     regions: tuple[Region, ...]
     cell_size: float
     skin: float | None
+    plug: float | None
     core: Any
     infill_in: InfillIn
     foreseen: Foreseen
@@ -240,22 +293,30 @@ class _Wanted:
         """The filling of a solid, once what it takes has been said."""
         forecast = self.foreseen(part)
         report_progress(progress, str(forecast), 0, round(forecast.seconds))
-        fillings = {fluid: self._one(part, fluid, faces, progress) for fluid, faces in opened.items()}
+        fillings = {fluid: self._one(part, fluid, opened, progress) for fluid in opened}
         return fillings[ANY] if ANY in fillings else PortedFilling(fillings)
 
-    def _one(self, part: Part, fluid: str, opened: Sequence[KernelFace], progress: Progress | None) -> Filling:
-        hollow = _hollow(part, self.skin, opened, self.core)
+    def _one(self, part: Part, fluid: str, opened: OpenFaces, progress: Progress | None) -> Filling:
+        others = [face for other, faces in opened.items() if other != fluid for face in faces]
+        hollow = _hollow(part, self.skin, opened[fluid], self.core, others, self.plug)
         inner = part if hollow is None else hollow.core
         regions = self.regions if fluid == ANY else tuple(one for one in self.regions if one.name == fluid)
         shared = self.kind == BODIES and fluid == ANY
         infill = functools.partial(self.infill_in, inner)
-        return Filling(part, hollow, regions, infill, self.cell_size, progress, shared, tuple(opened))
+        return Filling(part, hollow, regions, infill, self.cell_size, progress, shared, tuple(opened[fluid]))
 
 
-def _hollow(part: Part, skin: float | None, openings: Sequence[Any], core: Any) -> Hollow | None:
+def _hollow(
+    part: Part,
+    skin: float | None,
+    openings: Sequence[KernelFace],
+    core: Any,
+    plugged: Sequence[KernelFace],
+    plug: float | None,
+) -> Hollow | None:
     """The part in skin and core, if it has a skin."""
     if core is None:
-        return None if skin is None else hollowed(part, skin, openings)
+        return None if skin is None else hollowed(part, skin, openings, plugged, plug)
     try:
         inner = part_of(core)
     except ParameterError as refused:
@@ -285,7 +346,6 @@ def _reported(
     kind: Kind,
     grams: float | None,
 ) -> Filled:
-
     domains = outcome.domains
     skin = None if filling.hollow is None else filling.hollow.thickness
     shapes = {
@@ -299,6 +359,7 @@ def _reported(
     volume = sum(made.volume for made in material)
     walls = [outcome.infill.min_thickness] if kind not in (NETWORK_A, NETWORK_B, SURFACE) else []
     x, y, z = outcome.shift.tolist()
+    reports = tuple(fluid_of(name, some, filling, outcome) for name, some in domains.items() if name in fluids)
     report = FillReport(
         kind=kind,
         cell_size=filling.cell_size,
@@ -328,13 +389,11 @@ def _reported(
         cells_alike=outcome.infill.grading.cells_alike,
         uncovered=outcome.infill.uncovered,
         volumes={name: sum(made.volume for made in some) for name, some in domains.items()},
-        fluids=tuple(_fluid(name, some) for name, some in domains.items() if name in fluids),
+        fluids=reports,
     )
     sizes = {name: tuple(made.size for made in some) for name, some in domains.items()}
-    face_names = {name: tuple(called for made in some for called in made.face_names) for name, some in domains.items()}
+    own = NamedFaces(filling.part.named_faces)
+    face_names = {
+        name: tuple(called for made in some for called in with_own_names(made, own)) for name, some in domains.items()
+    }
     return Filled(shapes, report, sizes, face_names)
-
-
-def _fluid(name: str, made: Sequence[Made]) -> FluidReport:
-    volume, wetted = (sum(getattr(one, of) for one in made) for of in ("volume", "wetted"))
-    return fluid_report(name, volume, wetted, len(made))

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from gyroid_cad.builds.solid import write_shape
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
-from gyroid_cad.common.choices import Schema
+from gyroid_cad.common.choices import BODY_NAMES, BodyName, Schema
 from gyroid_cad.common.formats import (
     MESH_FORMATS,
     PART_FORMATS,
+    STL,
     TRIANGLE_FORMATS,
     format_of,
     require_formats,
     require_meshing,
+    require_regions,
     require_settings,
 )
 from gyroid_cad.common.progress import Progress, timed
@@ -27,9 +30,11 @@ from gyroid_cad.host_shapes import HostShapes
 from gyroid_cad.kernel.check import compound_of, topology
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.solid import KernelShape, another_handle
+from gyroid_cad.kernel.stl import triangles_of_bodies
 from gyroid_cad.mesh.finite_elements.files import require_mesh_format
 from gyroid_cad.mesh.tetrahedra.data import TetrahedralMesh
 from gyroid_cad.mesh.triangles.stl import require_near_origin
+from gyroid_cad.mesh.triangles.writing import region_name, write_regions
 from gyroid_cad.render.notebook import MimeBundle, mime_bundle, shape_picture
 from gyroid_cad.render.picture import CAMERA, SIZE, require_view
 from gyroid_cad.step.header import StepHeader
@@ -39,6 +44,7 @@ from gyroid_cad.wall.areas import ShapeSize
 __all__ = ["Filled"]
 
 # By which STEP knows them, so that no reader rounds them.
+_ALL = BODY_NAMES[0]
 _COLOURS = {WALL: "yellow", FLUID_A: "red", FLUID_B: "blue", SKIN: "white"}
 
 
@@ -200,6 +206,8 @@ class Filled(HostShapes):
         author: str = "",
         organisation: str = "",
         pcurves: bool = False,
+        products: bool = False,
+        regions: BodyName | None = None,
         element_size: float | None = None,
         elements_through: float | None = None,
         order: int = 1,
@@ -208,6 +216,15 @@ class Filled(HostShapes):
 
         Into files of meshes (.vtu, .msh, .inp, .cdb, .bdf, .nas) go tetrahedra, as of :meth:`mesh`, which takes the
         last three parameters.
+
+        Parameters
+        ----------
+        products : bool
+            Of several bodies make each a product of an assembly in STEP files, for programs that show no names of
+            solids, as Gmsh does not.
+        regions : {"all", "wall", "fluid-a", "fluid-b", "skin"}, optional
+            Of bodies write STL as text, faces of each name as a region, as OpenFOAM's meshers take them: those of a
+            body, which they close, or of all bodies, each face once and turned as the first body has it.
 
         Raises
         ------
@@ -223,21 +240,35 @@ class Filled(HostShapes):
         targets, limit = require_formats(paths, (*PART_FORMATS, *MESH_FORMATS)), self.deviation(deviation)
         meshes = [require_mesh_format(path) for path in targets if format_of(path) in MESH_FORMATS]
         require_elements(element_size, elements_through, order, bool(meshes))
-        header = StepHeader(schema, author, organisation, pcurves)
+        header = StepHeader(schema, author, organisation, pcurves, products)
         require_settings((1, 1, 1), limit, angle)
+        require_regions(self.report.kind, targets, regions)
+        if regions is not None and regions not in (_ALL, *self.domains):
+            raise ParameterError("regions", regions, f"{_ALL} or {' or '.join(self.domains)}")
         for path in (path for path in targets if format_of(path) in TRIANGLE_FORMATS):
             if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
-            if self.report.kind == BODIES:
-                raise ParameterError("output", str(path), "STEP or BREP, which tell bodies that share faces apart")
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
         sizes = [size for name in self.domains for size in self.sizes[name]]
         labels = self._labels()
         for path in (path for path in targets if path not in meshes):
             with timed(self.report.seconds, f"write {path.name}", progress):
-                write_shape(self.solid(), sizes, path, header, limit, angle, labels)
+                if regions is not None and format_of(path) is STL:
+                    self._write_regions(path, regions, limit, angle)
+                else:
+                    write_shape(self.solid(), sizes, path, header, limit, angle, labels)
         if meshes:
             self.mesh(element_size, elements_through, order, progress).write(*meshes, progress=progress)
+
+    def _write_regions(self, path: Path, body: BodyName, deviation: float, angle: float) -> None:
+        made = triangles_of_bodies(self.domains.values(), path, deviation, angle)
+        names = [name for domain in self.domains for name in self.face_names[domain]]
+        domains = [domain for domain in self.domains for _ in self.face_names[domain]]
+        wanted = [use for use, domain in enumerate(domains) if body in (_ALL, domain)]
+        if body == _ALL:
+            wanted = made.first_uses()
+        triangles, use = made.of(wanted)
+        write_regions(made.vertices, triangles, [region_name(names[number]) for number in use.tolist()], path)
 
     def _labels(self) -> BodyLabels:
         """Names of all solids; of bodies that share their faces colours and the names of those too."""

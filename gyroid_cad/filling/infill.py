@@ -36,12 +36,18 @@ from gyroid_cad.wall.distances import in_wall
 from gyroid_cad.wall.exact import offset_patches, patch_points_and_normals
 from gyroid_cad.wall.fitted import Closeness, LatticeSpec, fit_wall
 from gyroid_cad.wall.grading import Grading
-from gyroid_cad.wall.limits import require_cell_size
+from gyroid_cad.wall.limits import require_cell_size, require_none_beside_lattice
 from gyroid_cad.wall.offset import Wall, side_along
 from gyroid_cad.wall.parameters import LatticeParameters
 from gyroid_cad.wall.self_intersection import require_simple
 
-__all__ = ["Infill", "InfillIn", "block_infill", "described_infill", "endless_infill"]
+__all__ = [
+    "Infill",
+    "InfillIn",
+    "block_infill",
+    "described_infill",
+    "endless_infill",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -103,11 +109,14 @@ class Infill:
         """
         if not self.endless:
             return in_wall(self.wall, points)
+        return region.contains(self.offsets(points), self.half_thickness(points))
+
+    def half_thickness(self, points: Floats) -> Floats:
+        """Half of an endless lattice's wall at points of the part's space, in mm."""
         if self.grading.uniform:
-            return region.contains(self.offsets(points), np.full(len(points), self.max_thickness / 2))
+            return np.full(len(points), self.max_thickness / 2)
         own = self.frame.own(points)
-        half_thickness = self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2
-        return region.contains(self.offsets(points), half_thickness)
+        return np.asarray(self.grading.lay(own, np.broadcast_to([0.0, 0.0, 1.0], own.shape)).thickness / 2)
 
     def bounding(self, region: Region, patches: Integers) -> tuple[LatticeFaces, Booleans]:
         """Faces of some patches that bound a region, side walls too, and whether their normals point into it."""
@@ -161,11 +170,8 @@ def described_infill(
     Arguments and errors are those of :func:`gyroid_cad.fill`.
     """
     if lattice is not None:
-        given = {"cell_size": cell_size, "thickness": thickness, "density": density}
-        given |= {"tolerance": closeness.tolerance, "compact": closeness.compact}
-        for name, value in given.items():
-            if value is not None:
-                raise ParameterError(name, value, "none beside a lattice, which has its own")
+        fit = {"tolerance": closeness.tolerance, "compact": closeness.compact}
+        require_none_beside_lattice({"cell_size": cell_size, "thickness": thickness, "density": density, **fit})
         regions = _regions_beside(lattice, kind)
 
         def block(part: Part | BoundedExtent, frame: Frame, timed: Timed, least: float = 0.0) -> Infill:

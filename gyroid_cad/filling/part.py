@@ -24,7 +24,7 @@ from gyroid_cad.filling.wanted import Region
 from gyroid_cad.host_shapes import named_shapes
 from gyroid_cad.kernel.apart import read_named
 from gyroid_cad.kernel.boundary import ReadBoundary, read_boundary
-from gyroid_cad.kernel.check import compound_of, is_valid, measure, sealed_shells, topology, without_shells
+from gyroid_cad.kernel.check import compound_of, faces_of, is_valid, measure, sealed_shells, topology, without_shells
 from gyroid_cad.kernel.part import Part, require_part, sound_part
 from gyroid_cad.kernel.repair import separate_solids
 from gyroid_cad.kernel.skin import Hollow
@@ -98,6 +98,8 @@ class FilledBy(Protocol):
     @property
     def seconds(self) -> dict[str, float]: ...
     def near_misses(self, frame: Frame, within: float) -> NearMisses: ...
+    def timed(self, stage: str) -> AbstractContextManager[None]: ...
+    def of(self, fluid: str) -> Filling: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +175,10 @@ class Filling:
     def cells(self) -> float:
         """Number of cells that have the volume of what is filled."""
         return self.core.volume / self.cell_size**3
+
+    def of(self, fluid: str) -> Filling:
+        """The filling that gives a fluid: this one."""
+        return self
 
     def run(self, frame: Frame) -> Outcome:
         """Fill, with the lattice a little shifted where the kernel does not manage otherwise.
@@ -353,14 +359,22 @@ def bodies_of(given: Any, solids: Sequence[str | int] = ()) -> tuple[list[tuple[
     ExportError
         If a file is neither STEP nor BREP, or holds no shape.
     """
-    separate, remarks = separate_solids(*shapes_of(given), solid_names(solids))
-    return [(name, sound_part(solid)) for name, solid in separate], remarks
+    shapes, names, called = shapes_of(given)
+    named = tuple(
+        (face, name)
+        for shape, some in zip(shapes, called, strict=True)
+        for face, name in zip(faces_of(shape), some, strict=False)
+        if name
+    )
+    separate, remarks = separate_solids(shapes, names, solid_names(solids))
+    return [(name, replace(sound_part(solid), named_faces=named)) for name, solid in separate], remarks
 
 
-def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]]]:
-    """The kernel's shapes of whatever a user gives as a part, unchecked, and the names of each."""
+def shapes_of(given: Any) -> tuple[Sequence[KernelShape], Sequence[Sequence[str]], Sequence[Sequence[str]]]:
+    """The kernel's shapes of whatever a user gives as a part, unchecked, the names of each, and those of its faces."""
     if not isinstance(given, str | os.PathLike):
-        return named_shapes(given)
+        shapes, names = named_shapes(given)
+        return shapes, names, [[] for _ in shapes]
     if format_of(given) in TRIANGLE_FORMATS:
         raise ParameterError("part", str(given), 'a STEP or BREP file; triangles are filled by route="triangles"')
     return read_named(given)

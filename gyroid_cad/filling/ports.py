@@ -7,6 +7,7 @@ is the wall, with the skin and the plugs: it shares its faces with both.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.common.arrays import Point
+from gyroid_cad.common.checks import positive_number
 from gyroid_cad.common.choices import ROUTES, Kind, Route
 from gyroid_cad.errors import KernelError, ParameterError
 from gyroid_cad.filling.bodies import Crossed, Made, made_of, merged_chips
@@ -36,7 +38,7 @@ from gyroid_cad.trim.clearance import NearMisses
 from gyroid_cad.trim.measures import joined
 from gyroid_cad.wall.covering import PERTURBATIONS, Frame, first_success
 
-__all__ = ["ANY", "OpenFaces", "PortedFilling", "open_faces", "ports_of", "require_of_bodies"]
+__all__ = ["ANY", "OpenFaces", "PortedFilling", "checked_plug", "open_faces", "ports_of", "require_of_bodies"]
 
 Floats = NDArray[np.float64]
 
@@ -99,6 +101,23 @@ def require_of_bodies(kind: Kind, openings: Sequence[Any], drop_islands: bool, r
         raise ParameterError("drop_islands", drop_islands, "none of bodies, which fill the part together")
     if route != ROUTES[0]:
         raise ParameterError("kind", kind, "another at the route of triangles: bodies share exact faces")
+
+
+def checked_plug(plug: float | None, skin: float | None, openings: Sequence[Any], cell_size: float) -> float | None:
+    """Thickness in mm of what closes one fluid's channels where the other flows in; None for the skin's.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if plug is None:
+        return None
+    if ports_of(openings) is None or skin is None:
+        raise ParameterError("plug", plug, 'none without openings for fluids, as in "a:>X": they are what it stands at')
+    thickness = positive_number("plug", plug, "a length in mm, a finite number above 0")
+    if not skin <= thickness <= cell_size:
+        raise ParameterError("plug", plug, f"from the skin's {skin:g} mm to the {cell_size:g} mm of a cell")
+    return thickness
 
 
 def open_faces(parts: Sequence[tuple[str, Part]], openings: Sequence[Any]) -> list[OpenFaces]:
@@ -168,6 +187,14 @@ class PortedFilling:
     def seconds(self) -> dict[str, float]:
         """Seconds by stage."""
         return self._first.seconds
+
+    def timed(self, stage: str) -> AbstractContextManager[None]:
+        """Context that adds the seconds of a stage."""
+        return self._first.timed(stage)
+
+    def of(self, fluid: str) -> Filling:
+        """The filling that gives a fluid."""
+        return self.fillings[fluid]
 
     def near_misses(self, frame: Frame, within: float) -> NearMisses:
         """As of :meth:`Filling.near_misses`, of both cores."""
@@ -306,8 +333,8 @@ class _Fluid:
         ]
         return [*(as_face(face.Reversed()) for face in (*pieces.inside, *self.crossed.faces)), *ends]
 
-    def name_of(self, face: KernelShape) -> str | None:
-        """Name of a face that was made for this fluid."""
+    def name_of(self, face: KernelShape, body: str) -> str | None:
+        """Name that a face which was made for this fluid has on a body: chips have gone from one to another."""
         if self._lattice.Contains(face):
             return f"{WALL}/{self.name[-1]}"
         number = int(self._boundary.FindIndex(face)) - 1
@@ -316,9 +343,12 @@ class _Fluid:
         origin = self.crossed.pieces.origins[number]
         if not self.hollow.opened[origin]:
             return f"{SKIN}/{self.name[-1]}"
-        return f"{self.name[-1]}:{sum(self.hollow.opened[: origin + 1])}" if self.inner[number] else f"{SKIN}/outside"
+        return f"{SKIN}/outside" if body == WALL else f"{self.name[-1]}:{sum(self.hollow.opened[: origin + 1])}"
 
 
 def _name_of(face: KernelShape, made: dict[str, _Fluid], body: str) -> str:
-    found = (fluid.name_of(face) for fluid in made.values())
-    return next(filter(None, found), f"{SKIN}/outside")
+    for fluid in made.values():
+        name = fluid.name_of(face, body)
+        if name is not None:
+            return name
+    return f"{SKIN}/outside"

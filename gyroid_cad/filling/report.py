@@ -42,8 +42,13 @@ class FluidReport:
         In mm3 and mm2; mouths are not wetted.
     hydraulic_diameter : float
         Four times the volume by the wetted area, in mm.
-    pieces : int
-        Not connected to each other.
+    pieces, dead_ends : int
+        Not connected to each other, and those of them that have no second mouth to flow out by; in a skin, that come to
+        no second opening.
+    throat : float
+        Diameter of the largest sphere that passes between all openings of the fluid, in mm, to about a twentieth of a
+        cell, 0 where it is no wider; without a skin that has two the lattice's own, which is exact where the wall is
+        uniform.
     """
 
     name: str
@@ -51,11 +56,16 @@ class FluidReport:
     wetted_area: float
     hydraulic_diameter: float
     pieces: int
+    dead_ends: int
+    throat: float
 
     def __str__(self) -> str:
         pieces = "" if self.pieces == 1 else f" in {self.pieces} pieces"
+        if self.dead_ends:
+            pieces = f" in {self.pieces} pieces, {self.dead_ends} dead end{'s' * (self.dead_ends > 1)}"
+            pieces = " in a dead end" if self.pieces == 1 else pieces
         sizes = f"wetted {self.wetted_area:.6g} mm2, hydraulic diameter {self.hydraulic_diameter:.4g} mm"
-        return f"{self.volume:.8g} mm3{pieces}, {sizes}"
+        return f"{self.volume:.8g} mm3{pieces}, {sizes}, throat {self.throat:.4g} mm"
 
 
 # In the table; the report has all of them.
@@ -225,18 +235,21 @@ def warn_of_uncovered(share: float) -> None:
         warn_caller(f"{100 * share:.3g} % of the part is out of the lattice's reach", PartWarning)
 
 
-def fluid_report(name: str, volume: float, wetted: float, pieces: int) -> FluidReport:
+def fluid_report(
+    name: str, volume: float, wetted: float, pieces: int, dead_ends: int = 0, throat: float = 0.0
+) -> FluidReport:
     """Report on a fluid of so many mm3, that wets so many mm2.
 
     >>> fluid_report("fluid-a", 30.0, 60.0, 1).hydraulic_diameter
     2.0
     """
-    return FluidReport(name, volume, wetted, 4 * volume / wetted if wetted else 0.0, pieces)
+    return FluidReport(name, volume, wetted, 4 * volume / wetted if wetted else 0.0, pieces, dead_ends, throat)
 
 
 def _joint_fluid(some: Sequence[FluidReport]) -> FluidReport:
     volume, wetted = (sum(getattr(one, name) for one in some) for name in ("volume", "wetted_area"))
-    return fluid_report(some[0].name, volume, wetted, sum(one.pieces for one in some))
+    pieces, dead_ends = (sum(getattr(one, name) for one in some) for name in ("pieces", "dead_ends"))
+    return fluid_report(some[0].name, volume, wetted, pieces, dead_ends, min(one.throat for one in some))
 
 
 def joint_report(reports: Sequence[FillReport], remarks: Sequence[str] = ()) -> FillReport:

@@ -198,7 +198,7 @@ def triangle_part(
         if solid_names(solids):
             raise ParameterError("solids", solids, "none of a file of triangles, whose solids have no names")
         return TrianglePart(*_body_of_file(given, repair))
-    named = chosen_solids(*shapes_of(given), solid_names(solids))
+    named = chosen_solids(*shapes_of(given)[:2], solid_names(solids))
     require_volume(named)
     shape = compound_of(solid for _, solid in named)
     meshes = solid_triangles(shape, deviation)

@@ -15,7 +15,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import THINNEST_WALL
-from gyroid_cad.wall.limits import network_density, require_density, require_one, require_thickness
+from gyroid_cad.wall.limits import network_density, require_density, require_one, require_thickness, wall_beside_network
 
 __all__ = [
     "BODIES",
@@ -32,6 +32,7 @@ __all__ = [
     "Regions",
     "checked_skin",
     "grams_of",
+    "kind_beside",
     "regions_of",
 ]
 
@@ -168,11 +169,27 @@ def _wall(
     return Regions(regions, density=fraction)
 
 
-def _network(kind: Kind, cell_size: float, density: float, tube: TubeLaw) -> Regions:
+def _network(kind: Kind, cell_size: float, density: float | Field, tube: TubeLaw) -> Regions:
+    if isinstance(density, Field):
+        region = Region(kind, 1.0, None) if kind == NETWORK_A else Region(kind, None, -1.0)
+        return Regions((region,), density=wall_beside_network(density))
     offset = float(tube.network_offset(density) * cell_size)
     end = float(np.sign(offset)) if offset else 0.0
     region = Region(kind, end, None) if kind == NETWORK_A else Region(kind, None, -end)
     return Regions((region,), thickness=2 * abs(offset))
+
+
+def kind_beside(own: Kind | None, kind: Kind) -> Kind:
+    """Kind that is filled with a lattice of a kind of its own, if one is given; raises ParameterError.
+
+    >>> kind_beside("network-a", "sheet"), kind_beside("sheet", "bodies"), kind_beside(None, "channels")
+    ('network-a', 'bodies', 'channels')
+    """
+    if own in (None, SHEET, kind):
+        return kind
+    if kind != SHEET:
+        raise ParameterError("kind", kind, f"none beside a lattice whose own is {own}")
+    return own
 
 
 def grams_of(material_density: float) -> float:

@@ -19,7 +19,7 @@ from gyroid_cad.common.inputs import unreadable, utf8_named
 from gyroid_cad.common.packed import unpacked
 from gyroid_cad.common.processes import Started, started
 from gyroid_cad.errors import ExportError
-from gyroid_cad.kernel.assembly import read_bodies
+from gyroid_cad.kernel.assembly import read_bodies_and_faces
 from gyroid_cad.kernel.brep import read_brep
 from gyroid_cad.kernel.check import compound_of
 from gyroid_cad.kernel.step import read_step
@@ -66,8 +66,10 @@ def read_shape(path: str | os.PathLike[str]) -> TopoDS_Shape:
     return shape
 
 
-def read_named(path: str | os.PathLike[str]) -> tuple[Sequence[TopoDS_Shape], list[list[str]]]:
-    """Read the bodies of a user's STEP or BREP file, in millimetres, each with its names; of BREP there are none.
+def read_named(path: str | os.PathLike[str]) -> tuple[Sequence[TopoDS_Shape], list[list[str]], list[list[str]]]:
+    """Read the bodies of a user's STEP or BREP file, in millimetres, each with its names, and those of its faces.
+
+    Of BREP there are none.
 
     Raises
     ------
@@ -76,13 +78,15 @@ def read_named(path: str | os.PathLike[str]) -> tuple[Sequence[TopoDS_Shape], li
     """
     if require_cad_file(path) is BREP:
         shapes, _ = read_apart(path, brep_contents)
-        return shapes, [[] for _ in shapes]
-    return read_apart(path, bodies_of_step)
+        return shapes, [[] for _ in shapes], [[] for _ in shapes]
+    shapes, (names, face_names) = read_apart(path, bodies_of_step)
+    return shapes, names, face_names
 
 
 def bodies_of_step(path: str) -> Contents:
-    """Read the bodies of a STEP file and their names, in this process."""
-    return read_bodies(path)
+    """Read the bodies of a STEP file, their names and those of their faces, in this process."""
+    shapes, *names = read_bodies_and_faces(path)
+    return shapes, names
 
 
 def step_contents(path: str) -> Contents:

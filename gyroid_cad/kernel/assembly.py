@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.StepRepr import StepRepr_RepresentationItem
+from OCP.StepShape import StepShape_AdvancedFace
 from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_SOLID
+from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
@@ -29,13 +32,27 @@ from gyroid_cad.step.header import StepHeader, product_name
 from gyroid_cad.step.products import Occurrence, StepPart
 from gyroid_cad.wall.areas import ShapeSize, joint_size
 
-__all__ = ["GREEN", "RED", "YELLOW", "NamedFace", "NamedPart", "new_document", "read_bodies", "write_assembly"]
+__all__ = [
+    "GREEN",
+    "RED",
+    "YELLOW",
+    "NamedFace",
+    "NamedPart",
+    "new_document",
+    "read_bodies",
+    "read_bodies_and_faces",
+    "write_assembly",
+]
 
 # Of those that STEP knows by name (draughting_pre_defined_colour), so that no reader rounds them.
 YELLOW, RED, GREEN = "yellow", "red", "green"
 
 # What the kernel's writer calls a product that has no name; its occurrences it then numbers.
 _NAMELESS = "Open CASCADE STEP translator"
+# A face with a name; and what some programs write where there is none (a string, where it is no reference).
+_NAMED_FACE, _UNNAMED = re.compile(rb"ADVANCED_FACE\s*\(\s*'\s*[^'\s]"), "NONE"
+# At 40 ns each.
+_MOST_LOOKED_AT = 200_000_000
 # Of the document's unit of length, in metres: lengths are in mm.
 _MILLIMETRE = 1e-3
 _BINARY_DOCUMENT = "BinXCAF"
@@ -131,6 +148,13 @@ def new_document() -> TDocStd_Document:
 
 
 def read_bodies(path: str | os.PathLike[str]) -> tuple[list[TopoDS_Shape], list[list[str]]]:
+    """Read the bodies of a STEP file and their names, as :func:`read_bodies_and_faces` does."""
+    return read_bodies_and_faces(path)[:2]
+
+
+def read_bodies_and_faces(
+    path: str | os.PathLike[str],
+) -> tuple[list[TopoDS_Shape], list[list[str]], list[list[str]]]:
     """Read the bodies of a STEP file, each where its assembly has it, in millimetres.
 
     Returns
@@ -139,6 +163,8 @@ def read_bodies(path: str | os.PathLike[str]) -> tuple[list[TopoDS_Shape], list[
         The solids; of a product that has none, its faces.
     names : list of list of str
         Of each: that of the occurrence in its assembly, of its product, and its own if the product has several.
+    face_names : list of list of str
+        Of the faces of each, as the kernel counts them, "" of those that have none; nothing if no face has one.
 
     Raises
     ------
@@ -151,8 +177,8 @@ def read_bodies(path: str | os.PathLike[str]) -> tuple[list[TopoDS_Shape], list[
             raise ExportError(f"{path} could not be read as STEP")
     roots = LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
-    own_names = reader.ChangeReader().WS().TransferReader()
-    shapes, names = [], []
+    own_names, faces = reader.ChangeReader().WS().TransferReader(), _NamedFaces(path, reader)
+    shapes, names, face_names = [], [], []
     for label, place, called in _leaves(roots, TopLoc_Location()):
         shape = XCAFDoc_ShapeTool.GetShape_s(label)
         solids = list(parts_of(shape, TopAbs_SOLID))
@@ -161,9 +187,37 @@ def read_bodies(path: str | os.PathLike[str]) -> tuple[list[TopoDS_Shape], list[
             own = entity.Name().ToCString() if isinstance(entity, StepRepr_RepresentationItem) else ""
             shapes.append(solid.Moved(place))
             names.append([name for name in dict.fromkeys([*called, own]) if name])
+            face_names.append(faces.of(solid))
     if not shapes:
         raise ExportError(f"{path} holds no shape")
-    return shapes, names
+    return shapes, names, face_names
+
+
+class _NamedFaces:
+    """Faces to which a STEP file gives names, as its reader made them.
+
+    Parameters
+    ----------
+    path : path-like
+    reader : STEPCAFControl_Reader
+        Of which all has been transferred.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], reader: STEPCAFControl_Reader) -> None:
+        session = reader.ChangeReader().WS()
+        self._transferred, self._entities = session.TransferReader(), int(session.Model().NbEntities())
+        # Of most files no face needs to be looked at.
+        self._some = bool(_NAMED_FACE.search(Path(path).read_bytes()))
+
+    def of(self, shape: TopoDS_Shape) -> list[str]:
+        """Names of the faces of a shape that was read, as the kernel counts them; nothing where none has one."""
+        faces = list(parts_of(shape, TopAbs_FACE)) if self._some else []
+        # For each face the kernel goes through all entities.
+        if len(faces) * self._entities > _MOST_LOOKED_AT:
+            return []
+        found = (self._transferred.EntityFromShapeResult(face, 1) for face in faces)
+        names = [one.Name().ToCString().strip() if isinstance(one, StepShape_AdvancedFace) else "" for one in found]
+        return ["" if name == _UNNAMED else name for name in names]
 
 
 def _leaves(labels: LabelSequence, place: TopLoc_Location) -> Iterator[tuple[TDF_Label, TopLoc_Location, list[str]]]:

@@ -28,7 +28,7 @@ from gyroid_cad.mesh.triangles.distances import SignedDistances
 from gyroid_cad.mesh.triangles.files import numbered_corners
 from gyroid_cad.mesh.triangles.measures import unmatched_edges
 
-__all__ = ["Depths", "FaceDistances", "Inside", "NearDistances", "points_on"]
+__all__ = ["Depths", "FaceDistances", "Inside", "NamedFaces", "NearDistances", "points_on"]
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +42,8 @@ _ON_OPENING = 1e-4
 _FOLLOWED, _TRIES, _ROUNDS, _REACH = 6, 24, 5, 0.4
 # What is so much deeper than asked for need not be known better.
 _ENOUGH = 1.2
+# By so many places a face is told to lie on another, so near to it, in mm: what was mended lies no closer.
+_POINTS_TO_NAME, _ON_NAMED = 3, 1e-4
 # Of triangles that distances are measured from, in parts of a level, and in parts of the faces' extent; how far off
 # a distance from them may be, in deflections.
 _DEFLECTION, _COARSE, _FINE, _BAND = 1e-2, 1e-3, 1e-4, 2.0
@@ -78,6 +80,35 @@ class FaceDistances:
     def distances(self, points: Floats) -> Floats:
         """Distances of points, shape (n, 3), from the nearest face, in mm; shape (n,)."""
         return np.array([self.distance(point) for point in points])
+
+
+class NamedFaces:
+    """Names of faces by the places that lie on them.
+
+    Parameters
+    ----------
+    named : sequence of (TopoDS_Face, str)
+    """
+
+    def __init__(self, named: Sequence[tuple[TopoDS_Face, str]]) -> None:
+        self._names = [name for _, name in named]
+        self._boxes = [box_round([face]) for face, _ in named]
+        for box in self._boxes:
+            box.Enlarge(_ON_NAMED)
+        self._faces = [FaceDistances([face]) for face, _ in named]
+
+    def __bool__(self) -> bool:
+        return bool(self._names)
+
+    def name_of(self, face: TopoDS_Face) -> str | None:
+        """Name of the face that another lies on; None where that has none."""
+        points = points_on(face, _POINTS_TO_NAME)
+        for name, box, distances in zip(self._names, self._boxes, self._faces, strict=True):
+            if any(box.IsOut(gp_Pnt(*point)) for point in points.tolist()):
+                continue
+            if all(distances.distance(point) < _ON_NAMED for point in points):
+                return name
+        return None
 
 
 class NearDistances:

@@ -42,7 +42,7 @@ from gyroid_cad.kernel.ordered import in_order, sorted_by_place
 from gyroid_cad.kernel.sieve import OpenSkinError, core_of_pieces
 from gyroid_cad.kernel.skin_room import SkinRoom, shown_place
 
-__all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "offsets", "work"]
+__all__ = ["CLOSED_WAYS", "OPEN_WAYS", "core_of", "flat_normal", "offsets", "work"]
 
 Way = Callable[[TopoDS_Solid, Sequence[TopoDS_Face], float], TopoDS_Shape]
 
@@ -350,12 +350,10 @@ def _opened(core: TopoDS_Shape, openings: Sequence[TopoDS_Face], skin: float) ->
     solids with voids.
     """
     for face in openings:
-        surface = BRepAdaptor_Surface(face)
-        if surface.GetType() != GeomAbs_Plane:
+        normal = flat_normal(face)
+        if normal is None:
             continue
-        outwards = gp_Vec(surface.Plane().Axis().Direction()) * skin
-        if (face.Orientation() == TopAbs_REVERSED) == surface.Plane().Direct():
-            outwards.Reverse()
+        outwards = normal * skin
         try:
             floor = BRepAlgoAPI_Common(_moved(_inset(face, skin), outwards.Reversed()), core).Shape()
             core = BRepAlgoAPI_Fuse(core, BRepPrimAPI_MakePrism(floor, outwards).Shape()).Shape()
@@ -363,6 +361,17 @@ def _opened(core: TopoDS_Shape, openings: Sequence[TopoDS_Face], skin: float) ->
             # As many kinds of failure as there are algorithms; an opening that stays closed is found later.
             continue
     return core
+
+
+def flat_normal(face: TopoDS_Face) -> gp_Vec | None:
+    """Normal of a flat face out of its solid, of length 1; None of a bent one."""
+    surface = BRepAdaptor_Surface(face)
+    if surface.GetType() != GeomAbs_Plane:
+        return None
+    outwards = gp_Vec(surface.Plane().Axis().Direction())
+    if (face.Orientation() == TopAbs_REVERSED) == surface.Plane().Direct():
+        outwards.Reverse()
+    return outwards
 
 
 def _inset(face: TopoDS_Face, by: float) -> TopoDS_Shape:

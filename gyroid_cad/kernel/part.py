@@ -85,6 +85,8 @@ class Part:
         If the part is one solid and that is a box.
     area : float
         Of the boundary, in mm2.
+    named_faces : tuple of (TopoDS_Face, str)
+        Faces with the names that the part's file gives them, of the shape as it was read.
     """
 
     shape: TopoDS_Shape
@@ -94,6 +96,7 @@ class Part:
     volume: float
     box: Box | None = None
     area: float = 0.0
+    named_faces: tuple[tuple[TopoDS_Face, str], ...] = ()
 
     @cached_property
     def face_count(self) -> int:

@@ -17,7 +17,8 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
+from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
 from gyroid_cad.errors import KernelError, ParameterError
@@ -25,7 +26,7 @@ from gyroid_cad.kernel.check import compound_of, faces_of, is_valid, measure, pa
 from gyroid_cad.kernel.compat import ShapeSet, as_edge, as_face, as_solid
 from gyroid_cad.kernel.depth import Depths, FaceDistances, points_on
 from gyroid_cad.kernel.extent import bounding_box
-from gyroid_cad.kernel.offset import core_of
+from gyroid_cad.kernel.offset import core_of, flat_normal
 from gyroid_cad.kernel.part import Part, require_part, selected_faces
 from gyroid_cad.kernel.shells import VolumeOf, solids_of
 from gyroid_cad.kernel.sieve import with_changes
@@ -127,7 +128,13 @@ class Hollow:
         return with_changes(self.skin, pieces.changed) if any(self.opened) else self.skin
 
 
-def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Hollow:
+def hollow(
+    part: Part,
+    skin: float,
+    openings: Sequence[TopoDS_Shape] = (),
+    plugged: Sequence[TopoDS_Face] = (),
+    plug: float | None = None,
+) -> Hollow:
     """Part a part into a solid skin and the core inside.
 
     The skin lies on the inner side of all faces but the openings. Regions too thin for a core are skin altogether.
@@ -139,6 +146,10 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
         Its thickness, in mm.
     openings : sequence of TopoDS_Shape
         Faces, as of :func:`openings_of`, at which the core comes to the surface, but for a rim as wide as the skin.
+    plugged : sequence of TopoDS_Face
+        Others of the part's faces, flat ones, below which the skin is thicker.
+    plug : float, optional
+        Its thickness there, in mm.
 
     Raises
     ------
@@ -163,10 +174,27 @@ def hollow(part: Part, skin: float, openings: Sequence[TopoDS_Shape] = ()) -> Ho
         if deep > skin
         for core in core_of(solid, faces, skin, depth)
     ]
+    if plug is not None and plug > skin:
+        cores = _below_plugs(cores, plugged, plug)
     core = require_part(compound_of(cores))
     if opened:
         return _sharing(part, core, opened, skin)
     return Hollow(tuple(faces_of(part.shape)), core, len(faces_of(core.shape)) * (False,), skin)
+
+
+def _below_plugs(cores: Sequence[TopoDS_Solid], plugged: Sequence[TopoDS_Face], plug: float) -> list[TopoDS_Solid]:
+    """Cores less what lies straight below the faces that have plugs."""
+    left: TopoDS_Shape = compound_of(cores)
+    for face in plugged:
+        outwards = flat_normal(face)
+        if outwards is None:
+            raise ParameterError("plug", plug, "none, for the skin is all that closes channels at a face that is bent")
+        slab = BRepPrimAPI_MakePrism(face, outwards * -plug).Shape()
+        left = BRepAlgoAPI_Cut(left, slab).Shape()
+    solids = [as_solid(solid) for solid in parts_of(left, TopAbs_SOLID)]
+    if not solids:
+        raise ParameterError("plug", plug, "less: it leaves nothing of the core")
+    return solids
 
 
 def hollow_round(part: Part, core: Part) -> Hollow:

@@ -98,7 +98,7 @@ def write_step(
     """
     product = product_name(path, name)
     try:
-        parts, places = products_of(shape, product, labels, sizes, header.pcurves)
+        parts, places = products_of(shape, product, labels, sizes, header.pcurves, header.products)
     except UnknownGeometryError:
         _write_by_kernel(shape, path, header, escaped(product))
     else:

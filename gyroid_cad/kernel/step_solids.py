@@ -30,7 +30,7 @@ from gyroid_cad.kernel.compat import NumberedShapes, as_edge, as_face, as_solid,
 from gyroid_cad.kernel.step_geometry import Geometries, UnknownGeometryError, axis_placement, parameter_curve
 from gyroid_cad.step.bodies import LEAST_GAP, EdgeUse, StepBody, StepFace, StepLoop
 from gyroid_cad.step.geometry import ParameterCurve
-from gyroid_cad.step.products import UNLABELLED, BodyLabels, Occurrence, StepPart
+from gyroid_cad.step.products import UNLABELLED, BodyLabels, Occurrence, StepPart, parts_apart
 from gyroid_cad.wall.areas import ShapeSize
 
 __all__ = ["products_of", "read_step_bodies", "require_bodies"]
@@ -62,6 +62,7 @@ def products_of(
     labels: BodyLabels = UNLABELLED,
     sizes: Sequence[ShapeSize] = (),
     pcurves: bool = False,
+    products: bool = False,
 ) -> tuple[list[StepPart], list[Occurrence]]:
     """Return the parts that a shape is written as, and their places if it has a solid in several.
 
@@ -76,6 +77,8 @@ def products_of(
         One a body, or none; of bodies in several places, or of others than there are, they are left out.
     pcurves : bool
         As of :func:`read_step_bodies`.
+    products : bool
+        Whether bodies of each name, or each that has none, are a part of their own.
 
     Raises
     ------
@@ -85,15 +88,18 @@ def products_of(
     which = [kinds.Add(body.Located(TopLoc_Location()).Oriented(TopAbs_FORWARD)) - 1 for body in bodies]
     if len(bodies) == kinds.Extent():
         own = sizes if len(sizes) == len(bodies) else ()
+        read = read_step_bodies(shape, pcurves)
         part = StepPart(
             name,
-            read_step_bodies(shape, pcurves),
+            read,
             body_names=labels.names,
             body_colours=labels.colours,
             face_names=labels.face_names,
             body_sizes=own,
         )
-        return [part], []
+        if not products or len(bodies) == 1:
+            return [part], []
+        return parts_apart(part, [body.face_count for body in read])
     parts = [
         StepPart(f"{name} {kind}", read_step_bodies(kinds.FindKey(kind), pcurves))
         for kind in range(1, kinds.Extent() + 1)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise
 from math import radians
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,12 +21,12 @@ from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.StlAPI import StlAPI_Writer
 from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS_Shape
+from OCP.TopoDS import TopoDS_Face, TopoDS_Shape
 
 from gyroid_cad.common.formats import DEFAULT_ANGLE, require_meshing
 from gyroid_cad.errors import ExportError, KernelError, ParameterError
 from gyroid_cad.kernel.check import compound_of, parts_of
-from gyroid_cad.kernel.compat import as_face
+from gyroid_cad.kernel.compat import NumberedShapes, as_face
 from gyroid_cad.kernel.extent import box_round, corners_of
 from gyroid_cad.kernel.outlines import face_triangles
 from gyroid_cad.kernel.surfaces import translation
@@ -34,7 +36,16 @@ from gyroid_cad.mesh.triangles.stl import is_coarse
 from gyroid_cad.mesh.triangles.storing import storable_triangles
 from gyroid_cad.mesh.triangles.writing import write_triangles
 
-__all__ = ["closed_triangles", "diagonal", "meshed", "meshed_by_face", "solid_triangles", "write_meshed_stl"]
+__all__ = [
+    "BodyTriangles",
+    "closed_triangles",
+    "diagonal",
+    "meshed",
+    "meshed_by_face",
+    "solid_triangles",
+    "triangles_of_bodies",
+    "write_meshed_stl",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -171,6 +182,96 @@ def solid_triangles(shape: TopoDS_Shape, deviation: float) -> list[tuple[Floats,
         (vertices + away, triangles, faces)
         for vertices, triangles, faces in _bodies(near, "part", deviation, DEFAULT_ANGLE)
     ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyTriangles:
+    """Triangles of bodies that share faces: of each face once.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (vertices, 3)
+        In mm.
+    triangles : ndarray of int, shape (triangles, 3)
+        As the face's first use has them, counterclockwise seen from outside.
+    faces : ndarray of int, shape (triangles,)
+        That they lie on.
+    uses : tuple of (face, turned)
+        Of all bodies, as the kernel counts faces.
+    """
+
+    vertices: Floats
+    triangles: Integers
+    faces: Integers
+    uses: tuple[tuple[int, bool], ...]
+
+    def first_uses(self) -> list[int]:
+        """Numbers of the uses that are each the first of its face."""
+        first: dict[int, int] = {}
+        for number, (face, _) in enumerate(self.uses):
+            first.setdefault(face, number)
+        return list(first.values())
+
+    def of(self, uses: Sequence[int]) -> tuple[Integers, Integers]:
+        """Triangles of some uses of faces, turned as those have them, and the use of each."""
+        order = np.argsort(self.faces, kind="stable")
+        bounds = np.searchsorted(self.faces[order], np.arange(1 + max(face for face, _ in self.uses) + 1))
+        made, numbers = [np.empty((0, 3), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+        for use in uses:
+            face, turned = self.uses[use]
+            own = self.triangles[order[bounds[face] : bounds[face + 1]]]
+            made.append(own[:, ::-1] if turned else own)
+            numbers.append(np.full(len(own), use))
+        return np.concatenate(made), np.concatenate(numbers)
+
+
+def triangles_of_bodies(
+    bodies: Iterable[TopoDS_Shape], path: str | os.PathLike[str], deviation: float, angle: float = DEFAULT_ANGLE
+) -> BodyTriangles:
+    """Triangles of bodies that share faces and edges, so that they close each of the bodies.
+
+    Parameters
+    ----------
+    bodies : iterable of TopoDS_Shape
+    path : path-like
+        Named where it can't be written.
+    deviation, angle : float
+        As of :func:`closed_triangles`.
+
+    Raises
+    ------
+    ParameterError, ExportError
+    """
+    require_meshing(deviation, angle)
+    solids = [solid for body in bodies for solid in parts_of(body, TopAbs_SOLID)]
+    known, ends = NumberedShapes(), [0]
+    faces: list[TopoDS_Face] = []
+    uses: list[tuple[int, bool]] = []
+    for solid in solids:
+        for face in map(as_face, parts_of(solid, TopAbs_FACE)):
+            number = int(known.Add(face)) - 1
+            if number == len(faces):
+                faces.append(face)
+            uses.append((number, face.Orientation() != faces[number].Orientation()))
+        ends.append(len(uses))
+    own = [range(*some) for some in pairwise(ends)]
+    for meshed_faces in _ways_to_mesh(faces, path, deviation, angle):
+        made = BodyTriangles(*meshed_faces, tuple(uses))
+        if not any(unmatched_edges(made.of(some)[0]) for some in own):
+            return made
+    left_open = next(triangles for some in own if unmatched_edges(triangles := made.of(some)[0]))
+    raise _left_open(path, left_open, deviation)
+
+
+def _ways_to_mesh(
+    faces: Sequence[TopoDS_Face], path: str | os.PathLike[str], deviation: float, angle: float
+) -> Iterator[Body]:
+    """Triangles of faces by our mesher, and by the kernel's, ever finer."""
+    with suppress(KernelError):
+        made = face_triangles(faces, deviation, radians(angle))
+        yield made.vertices, made.triangles, made.faces
+    for finer in _FINER:
+        yield _by_kernel(compound_of(faces), path, deviation * finer, angle)
 
 
 def _together(bodies: Sequence[Body]) -> Body:

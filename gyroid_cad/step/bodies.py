@@ -97,6 +97,11 @@ class StepBody:
     solid: bool = True
 
     @property
+    def face_count(self) -> int:
+        """Number of its faces."""
+        return sum(map(len, self.shells))
+
+    @property
     def extent(self) -> float:
         """The largest coordinate of its vertices and splines, in mm."""
         splines = [one for one in (*self.surfaces, *self.curves) if isinstance(one, Spline)]

@@ -33,6 +33,8 @@ class StepHeader:
         In any script; unnamed if left out.
     pcurves : bool
         Whether edges have curves in the parameters of their faces too, for receivers that do not make them.
+    products : bool
+        Whether several bodies are products of an assembly each, for receivers that show no names of bodies.
 
     Raises
     ------
@@ -43,6 +45,7 @@ class StepHeader:
     author: str = ""
     organisation: str = ""
     pcurves: bool = False
+    products: bool = False
 
     def __post_init__(self) -> None:
         require_schema(self.schema)

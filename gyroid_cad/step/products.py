@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from gyroid_cad.common.choices import Schema
 from gyroid_cad.step.bodies import LEAST_GAP, WritableBody
 from gyroid_cad.step.geometry import AxisPlacement
 from gyroid_cad.step.header import StepHeader, header_section
 from gyroid_cad.step.text import StepText, quoted, real, refs
-from gyroid_cad.wall.areas import ShapeSize
+from gyroid_cad.wall.areas import ShapeSize, joint_size
 
-__all__ = ["UNLABELLED", "BodyLabels", "Occurrence", "StepPart", "write_products"]
+__all__ = ["UNLABELLED", "BodyLabels", "Occurrence", "StepPart", "parts_apart", "write_products"]
 
 _HOME: AxisPlacement = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 # Of a schema: name and version, and of its application: name, year and purpose.
@@ -107,6 +109,38 @@ class Occurrence:
     part: int
     name: str
     frame: AxisPlacement
+
+
+def parts_apart(part: StepPart, face_counts: Sequence[int]) -> tuple[list[StepPart], list[Occurrence]]:
+    """Return the bodies of a part as parts of an assembly: of one name together, those that have none each by itself.
+
+    Each stands where it is.
+
+    Parameters
+    ----------
+    part : StepPart
+    face_counts : sequence of int
+        Numbers of faces, one a body.
+    """
+    names = list(part.body_names) or [f"{part.name} {number}" for number in range(1, len(part.bodies) + 1)]
+    ends = np.cumsum([0, *face_counts]).tolist()
+    parts = []
+    for name in dict.fromkeys(names):
+        own = [number for number, called in enumerate(names) if called == name]
+        sizes = [part.body_sizes[number] for number in own] if part.body_sizes else []
+        parts.append(
+            StepPart(
+                name,
+                [part.bodies[number] for number in own],
+                part.colour,
+                body_names=[name] * len(own),
+                body_sizes=sizes,
+                body_colours=[part.body_colours[number] for number in own] if part.body_colours else [],
+                face_names=[called for number in own for called in part.face_names[ends[number] : ends[number + 1]]],
+                size=joint_size(sizes) if sizes else None,
+            )
+        )
+    return parts, [Occurrence(number, one.name, _HOME) for number, one in enumerate(parts)]
 
 
 def write_products(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from numbers import Integral
+from typing import Any
+
 from gyroid_cad.common.choices import BLOCK_KINDS, Kind
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.fields.field import FieldLike, as_field
+from gyroid_cad.fields.field import Field, FieldLike, as_field
 from gyroid_cad.surface.families import TubeLaw
 from gyroid_cad.wall.grading import LARGEST_CELL, SMALLEST_CELL, THINNEST_WALL
 
@@ -15,12 +20,34 @@ __all__ = [
     "percent_hint",
     "require_cell_size",
     "require_density",
+    "require_none_beside_lattice",
     "require_one",
     "require_sheet",
     "require_thickness",
+    "wall_beside_network",
+    "whole_cells",
 ]
 
 SHEET_KIND, *NETWORK_KINDS = BLOCK_KINDS[:3]
+_MOST_CELLS_ALONG = 1_000_000
+
+
+def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:
+    """Numbers of cells along x, y, z.
+
+    Raises
+    ------
+    ParameterError
+    """
+    accepted = f"three whole numbers, each from 1 to {_MOST_CELLS_ALONG}"
+    try:
+        counts = tuple(cells)
+    except TypeError:
+        raise ParameterError("cells", cells, accepted) from None
+    whole = all(isinstance(n, Integral) and not isinstance(n, bool) and 1 <= n <= _MOST_CELLS_ALONG for n in counts)
+    if len(counts) != 3 or not whole:
+        raise ParameterError("cells", cells, accepted)
+    return int(counts[0]), int(counts[1]), int(counts[2])
 
 
 def require_cell_size(cell_size: float) -> None:
@@ -78,8 +105,8 @@ def require_sheet(kind: Kind) -> None:
         raise ParameterError("kind", kind, accepted)
 
 
-def network_density(density: FieldLike | None, thickness: FieldLike | None, tube: TubeLaw) -> float:
-    """Volume fraction of a network, which alone describes it, as one number.
+def network_density(density: FieldLike | None, thickness: FieldLike | None, tube: TubeLaw) -> float | Field:
+    """Volume fraction of a network, which alone describes it.
 
     Raises
     ------
@@ -89,14 +116,22 @@ def network_density(density: FieldLike | None, thickness: FieldLike | None, tube
         raise ParameterError("thickness", thickness, "none of a network, which is told by its density")
     low, high = (1 - tube.max_density) / 2, (1 + tube.max_density) / 2
     meaning = "the network's volume fraction"
-    accepted = f"{meaning}, one number above {low:.5f} and below {high:.5f}"
+    accepted = f"{meaning}, above {low:.5f} and below {high:.5f}"
     fraction = as_field("density", density, meaning)
-    # Only an offset of the mid-surface that is the same everywhere bounds a network of this density.
-    if not isinstance(fraction, float):
-        raise ParameterError("density", density, accepted)
-    if not low < fraction < high:
+    if isinstance(fraction, float) and not low < fraction < high:
         raise ParameterError("density", fraction, accepted + percent_hint(fraction))
     return fraction
+
+
+def wall_beside_network(density: Field) -> Field:
+    """Density of the wall that two networks leave between them, each of which takes up so much, below a half.
+
+    >>> from gyroid_cad.fields import constant
+    >>> float(wall_beside_network(constant(0.3))(0, 0, 0))
+    0.4
+    """
+    wall = 1 - 2 * density
+    return replace(wall, parameter="1 - 2 x density")
 
 
 def percent_hint(fraction: float) -> str:
@@ -123,3 +158,15 @@ def require_one(thickness: object, density: object) -> None:
     if (thickness is None) == (density is None):
         given = {"thickness": thickness, "density": density}
         raise ParameterError("thickness, density", given, "exactly one of the two")
+
+
+def require_none_beside_lattice(given: Mapping[str, Any]) -> None:
+    """Refuse what a lattice that is given has of its own.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, value in given.items():
+        if value is not None:
+            raise ParameterError(name, value, "none beside a lattice, which has its own")

@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import prod
-from numbers import Integral
 from typing import Self
 
 from numpy.typing import ArrayLike
 
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number
-from gyroid_cad.common.choices import BLOCK_KINDS, TRIMS, Kind, SurfaceName, Trim
+from gyroid_cad.common.choices import BLOCK_KINDS, TARGETS, TRIMS, Kind, SurfaceName, Trim
 from gyroid_cad.common.progress import Progress
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.fields.field import Field, FieldLike, as_field
@@ -36,31 +35,12 @@ from gyroid_cad.wall.limits import (
     require_one,
     require_sheet,
     require_thickness,
+    wall_beside_network,
+    whole_cells,
 )
 from gyroid_cad.wall.offset import Wall
 
-__all__ = ["LatticeParameters", "MapLike", "whole_cells"]
-
-MOST_CELLS_ALONG = 1_000_000
-
-
-def whole_cells(cells: Sequence[int]) -> tuple[int, int, int]:
-    """Numbers of cells along x, y, z.
-
-    Raises
-    ------
-    ParameterError
-    """
-    accepted = f"three whole numbers, each from 1 to {MOST_CELLS_ALONG}"
-    try:
-        counts = tuple(cells)
-    except TypeError:
-        raise ParameterError("cells", cells, accepted) from None
-    whole = all(isinstance(n, Integral) and not isinstance(n, bool) and 1 <= n <= MOST_CELLS_ALONG for n in counts)
-    if len(counts) != 3 or not whole:
-        raise ParameterError("cells", cells, accepted)
-    return int(counts[0]), int(counts[1]), int(counts[2])
-
+__all__ = ["LatticeParameters", "MapLike"]
 
 MapLike = BlockMap | str | Callable[..., Sequence[ArrayLike]]
 
@@ -76,7 +56,8 @@ class LatticeParameters:
     """The parameters of :class:`gyroid_cad.Lattice`, which tells of each, and what follows from them alone."""
 
     cells: tuple[int, int, int]
-    cell_size: float
+    # A number once its description is complete: it may follow from others.
+    cell_size: float = None  # type: ignore[assignment]
     thickness: FieldLike | None = None
     density: FieldLike | None = None
     fit: FitSettings = field(default_factory=FitSettings)
@@ -90,9 +71,16 @@ class LatticeParameters:
     rotation: Point = HOME
     compact: float | None = None
     kind: Kind = SHEET_KIND
+    porosity: FieldLike | None = None
+    pore_size: float | None = None
+    throat: float | None = None
+    hydraulic_diameter: float | None = None
+    area_per_volume: float | None = None
+    curvature_radius: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cells", whole_cells(self.cells))
+        self._take_targets()
         object.__setattr__(
             self, "cell_size", finite_number("cell_size", self.cell_size, "a length in mm, a finite number")
         )
@@ -247,7 +235,9 @@ class LatticeParameters:
         600.0
         """
         if not self.uniform:
-            return self._measures().volume
+            wall = self._measures().volume
+            # Of what the wall leaves either network has half, to second order in the gradient.
+            return (block_volume(self.cells, self.grading()) - wall) / 2 if self.network else wall
         return prod(self.cells) * self.volume_fraction * self.cell_size**3
 
     def spec(self) -> LatticeSpec:
@@ -279,7 +269,7 @@ class LatticeParameters:
         return Grading(
             self.cell_size,
             self.thickness,  # type: ignore[arg-type]
-            self.density,  # type: ignore[arg-type]
+            wall_beside_network(self.density) if self.network else self.density,  # type: ignore[arg-type]
             self.scale_field,  # type: ignore[arg-type]
             space,
             self.minimal_surface,
@@ -341,6 +331,20 @@ class LatticeParameters:
 
     def _measures(self) -> ExactMeasures:
         return _measures(self.cells, self.grading())
+
+    def _take_targets(self) -> None:
+        """Put cell size and wall in the place of what describes them otherwise."""
+        targets = {name: getattr(self, name) for name in TARGETS}
+        if any(value is not None for value in targets.values()):
+            # What is needed to solve for them takes longer to load than a cell to build.
+            from gyroid_cad.wall.laws import wall_from
+
+            own = wall_from(self.surface, self.kind, self.cell_size, self.thickness, self.density, targets)
+            for name, value in (
+                *zip(("cell_size", "thickness", "density"), own, strict=True),
+                *dict.fromkeys(TARGETS).items(),
+            ):
+                object.__setattr__(self, name, value)
 
     def _require_variable(self) -> None:
         """Check a graded lattice as far as can be before it is built."""

@@ -46,7 +46,7 @@ _ONWARD = np.array([step for step in np.ndindex(3, 3, 3) if step > (1, 1, 1)]) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoreLimits:
-    """The throats of a surface's two networks.
+    """The throats of a surface's two networks, and the spheres that fit where those are widest.
 
     Attributes
     ----------
@@ -56,11 +56,14 @@ class PoreLimits:
         Whether they lie in the network that the common normal points to.
     radius : float
         Distance from the mid-surface, in cell sizes: the less of the two networks'.
+    inscribed : float
+        The largest distance of any place from the mid-surface, in cell sizes: the less of the two networks'.
     """
 
     centres: Floats
     above: Booleans
     radius: float
+    inscribed: float
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -95,21 +98,26 @@ def network_throats(surface: MinimalSurface) -> PoreLimits:
     nodes = np.stack(np.meshgrid(*3 * [np.arange(_NODES) / _NODES], indexing="ij"), axis=-1).reshape(-1, 3)
     offsets, nearest = nearest_offsets(places, normals, nodes)
     distance, above = np.linalg.norm(nodes - places[nearest], axis=1), offsets > 0
-    chosen, radii = [], []
+    chosen, radii, widest = [], [], []
+
+    def exactly(node: int) -> float:
+        """Distance of a node from the exact surface, by Newton's method from the nearest sample."""
+        patch, sample = divmod(int(nearest[node]), _EXACT_SAMPLES**2)
+        turn = complex.placements.matrices[complex.patch_placement[patch]]
+        middle = complex.placements.translations[complex.patch_placement[patch]] / CELL_QUARTERS
+        # In the patch's own frame, whose unit is half a cell.
+        own = 2 * (nodes[[node]] - middle - complex.patch_cell[patch]) @ turn
+        start_u, start_v = samples[np.array(divmod(sample, _EXACT_SAMPLES))][:, np.newaxis]
+        return float(nearest_places(own, start_u, start_v, partial(patch_derivatives, surface.family))[2][0]) / 2
+
     for side in (True, False):
         held = _held(np.where(above == side, distance, 0.0).reshape(3 * [_NODES]))
         at = np.flatnonzero((above == side) & (np.abs(distance - held) < _EQUALLY_FAR))
         chosen.append(at)
-        patch, sample = divmod(int(nearest[at[0]]), _EXACT_SAMPLES**2)
-        turn = complex.placements.matrices[complex.patch_placement[patch]]
-        middle = complex.placements.translations[complex.patch_placement[patch]] / CELL_QUARTERS
-        # In the patch's own frame, whose unit is half a cell.
-        own = 2 * (nodes[at[:1]] - middle - complex.patch_cell[patch]) @ turn
-        start_u, start_v = samples[np.array(divmod(sample, _EXACT_SAMPLES))][:, np.newaxis]
-        reached = nearest_places(own, start_u, start_v, partial(patch_derivatives, surface.family))[2]
-        radii.append(float(reached[0]) / 2)
+        radii.append(exactly(int(at[0])))
+        widest.append(exactly(int(np.argmax(np.where(above == side, distance, 0.0)))))
     every = np.concatenate(chosen)
-    return PoreLimits(nodes[every], above[every], min(radii))
+    return PoreLimits(nodes[every], above[every], min(radii), min(widest))
 
 
 def narrowest_opening(wall: Wall, grading: Grading, cells: tuple[int, int, int]) -> float:

@@ -56,6 +56,27 @@ def test_a_network_and_the_other_ones_complement_are_the_block() -> None:
     assert sum(volumes.values()) == pytest.approx(CELL**3, rel=1e-6)
 
 
+def test_a_network_may_vary_and_its_density_is_what_it_is_asked_to_be() -> None:
+    graded = Lattice((2, 1, 1), CELL, density="0.2 + 0.0125*x", trim="box", kind="network-b", tolerance=1e-3)
+    found = graded.report()
+    assert found.volume == pytest.approx(0.3 * 2 * CELL**3, rel=1e-3)
+    assert graded.exact_volume == pytest.approx(found.volume, rel=1e-3)
+    # The end where x is small has less of it.
+    at = cq.Shape.cast(graded.solid()).Center().x
+    assert at == pytest.approx(CELL * (1 + 0.1 / 0.3 / 3), rel=2e-2)
+    # A part, whose places the field is of.
+    part = cq.Workplane().box(5, 4, 4)
+    even = fill(part, CELL, density=0.3, kind="network-a", fit=FIT, origin=ORIGIN).report.volume
+    varied = fill(part, CELL, density=linear(0.3), kind="network-a", tolerance=1e-3, origin=ORIGIN).report.volume
+    assert varied == pytest.approx(even, rel=1e-4)
+
+
+@pytest.mark.parametrize("density", ["0.45 + 0.02*x", "0.01 + 0.001*x"])
+def test_a_network_that_varies_stays_below_a_half_and_its_wall_below_the_largest(density: str) -> None:
+    with pytest.raises(ParameterError, match=r"1 - 2 x density = .* expected (above 0|below 0.94)"):
+        Lattice((1, 1, 1), CELL, density=density, trim="box", kind="network-a").report()
+
+
 def test_channels_of_a_graded_block_and_its_wall_are_the_block() -> None:
     wall = linear(0.5, x=0.03)
     sheet = Lattice((1, 1, 1), CELL, wall, trim="box", tolerance=1e-3, keep_islands=True)

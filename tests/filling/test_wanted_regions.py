@@ -73,7 +73,7 @@ def test_a_network_has_no_thickness() -> None:
         regions_of(NETWORK_A, L, 1.0, None, TUBE)
 
 
-@pytest.mark.parametrize("given", ["0.3 + 0.01*x", "0.01", "1.2", "nan", True, None])
-def test_a_networks_density_that_varies_or_leaves_its_range_is_refused_with_the_range(given: Any) -> None:
+@pytest.mark.parametrize("given", ["0.01", "1.2", "nan", True, None])
+def test_a_networks_density_that_leaves_its_range_is_refused_with_the_range(given: Any) -> None:
     with pytest.raises(ParameterError, match="density"):
         regions_of(NETWORK_B, L, None, given, TUBE)

@@ -39,7 +39,7 @@ _DEVIATION, _ANGLE = 0.05, 15.0
 # Of the sides by which places on the faces are looked up, in parts of the size.
 _LOOKED_UP = 0.5
 # Triangles are made finer where they come too near each other, and where elements are poor, so many times.
-_TRIES, _TRIES_FOR_QUALITY = 6, 2
+_TRIES, _TRIES_FOR_QUALITY, _MOST_GIVEN_UP = 6, 1, 2
 _FINER = 0.5
 # The smallest mean ratio that needs no second try.
 _FAIR = 0.15
@@ -178,49 +178,69 @@ class _Surface:
         self.volumes = np.array([meshed.volumes[name] for name in regions])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Try:
+    """Triangles with the tetrahedra between them, if there are any, and what is amiss with them.
+
+    Where triangles or elements are to be finer there are places, in mm, with the lengths of the edges there.
+    """
+
+    mesh: SurfaceMesh
+    volume: Volume | None
+    smallest_ratio: float
+    problem: str
+    places: Floats
+    lengths: Floats
+
+
 def _best(surface: _Surface, size: float, order: int) -> tuple[SurfaceMesh, Volume]:
     """Triangles and tetrahedra, the best of some tries.
 
     Raises
     ------
     KernelError
+        If none is sound.
     """
-    best: tuple[SurfaceMesh, Volume] | None = None
-    highest, problem, sound = -np.inf, "", 0
+    sound, given_up = list[_Try](), 0
     for _ in range(_TRIES):
-        mesh = surface.work.placed()
-        places, lengths = narrow_places(mesh)
-        problem = "faces come too near each other"
-        if not len(places):
-            try:
-                volume = filled_volume(mesh, surface.sides, size)
-            except KernelError as failed:
-                problem = str(failed)
-                break
-            quadratic = with_middles(volume, mesh, surface.exact)
-            ratios = mean_ratios(volume.points, volume.cells)
-            turned = smallest_determinants(quadratic.points, quadratic.cells) <= 0
-            chosen = quadratic if order == 2 else volume
-            problem = _disagreement(volume, quadratic, surface.volumes)
-            if order == 2 and turned.any():
-                problem = f"{int(turned.sum())} elements with middles on the faces are turned inside out"
-            poor = (ratios < _FAIR) | (turned if order == 2 else False)
-            if not problem:
-                sound += 1
-                if ratios.min() > highest:
-                    best, highest = (mesh, chosen), float(ratios.min())
-                if not poor.any() or sound > _TRIES_FOR_QUALITY:
-                    break
-            corners = volume.points[volume.cells[poor]]
-            places = corners.mean(axis=1)
-            lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean(axis=1)
-        if not len(places):
+        one = _tried(surface, size, order)
+        given_up += one.volume is None and not len(one.places)
+        if given_up > _MOST_GIVEN_UP or (one.problem and one.volume is not None and not len(one.places)):
             break
-        surface.work.refine(places, _FINER * lengths)
-    if best is None:
-        where = f" near ({', '.join(f'{x:.4g}' for x in places[0])}) mm" if len(places) else ""
-        raise KernelError(f"no mesh of elements of {size:.4g} mm: {problem}{where}; another element size may do")
-    return best
+        if not one.problem:
+            sound.append(one)
+            if not len(one.places) or len(sound) > _TRIES_FOR_QUALITY:
+                break
+        # Where Netgen gives up, other triangles of the same sizes may do.
+        surface.work.refine(one.places, _FINER * one.lengths)
+    if not sound:
+        where = f" near ({', '.join(f'{x:.4g}' for x in one.places[0])}) mm" if len(one.places) else ""
+        raise KernelError(f"no mesh of elements of {size:.4g} mm: {one.problem}{where}; another element size may do")
+    best = max(sound, key=lambda one: one.smallest_ratio)
+    assert best.volume is not None
+    return best.mesh, best.volume
+
+
+def _tried(surface: _Surface, size: float, order: int) -> _Try:
+    """Tetrahedra between the triangles as they are now."""
+    mesh, nowhere = surface.work.placed(), (np.empty((0, 3)), np.empty(0))
+    places, lengths = narrow_places(mesh)
+    if len(places):
+        return _Try(mesh, None, 0.0, "faces come too near each other", places, lengths)
+    try:
+        volume = filled_volume(mesh, surface.sides, size)
+    except KernelError as failed:
+        return _Try(mesh, None, 0.0, str(failed), *nowhere)
+    quadratic = with_middles(volume, mesh, surface.exact)
+    ratios = mean_ratios(volume.points, volume.cells)
+    turned = (smallest_determinants(quadratic.points, quadratic.cells) <= 0) & (order == 2)
+    problem = _disagreement(volume, quadratic, surface.volumes)
+    if turned.any():
+        problem = f"{int(turned.sum())} elements with middles on the faces are turned inside out"
+    corners = volume.points[volume.cells[turned | (ratios < _FAIR)]]
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean(axis=1)
+    chosen = quadratic if order == 2 else volume
+    return _Try(mesh, chosen, float(ratios.min()), problem, corners.mean(axis=1), lengths)
 
 
 def _disagreement(straight: Volume, curved: Volume, exact: Floats) -> str:

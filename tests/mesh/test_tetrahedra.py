@@ -167,6 +167,16 @@ def test_other_files_have_the_regions_as_numbers(linear: TetrahedralMesh, tmp_pa
     assert meshio.read(tmp_path / "bodies.bdf").cell_data["nastran:ref"][0].tolist() == linear.parts.tolist()
 
 
+def test_ansys_files_have_regions_and_faces_as_components(linear: TetrahedralMesh, tmp_path: Path) -> None:
+    reader = pytest.importorskip("ansys.mapdl.reader", reason="no ansys-mapdl-reader")
+    pytest.importorskip("mapdl_archive", reason="no mapdl-archive")
+    linear.write(tmp_path / "bodies.cdb")
+    archive = reader.Archive(str(tmp_path / "bodies.cdb"))
+    assert sorted(archive.element_components) == ["FLUID_A", "FLUID_B", "WALL"]
+    assert len(archive.element_components["WALL"]) == len(linear.regions()["wall"])
+    assert len(archive.node_components["WALL_A"]) == len(linear.node_sets()["wall/a"])
+
+
 def test_heat_that_enters_one_fluid_leaves_the_other_through_the_wall(quadratic: TetrahedralMesh) -> None:
     fem = pytest.importorskip("skfem", reason="no scikit-fem")
     mesh, corners = quadratic, int(quadratic.cells[:, :4].max()) + 1

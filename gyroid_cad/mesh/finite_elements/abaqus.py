@@ -19,7 +19,7 @@ from gyroid_cad.errors import ParameterError
 from gyroid_cad.mesh.finite_elements.data import WrittenMesh
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
-__all__ = ["abaqus_name", "write_abaqus"]
+__all__ = ["abaqus_name", "set_name_of", "write_abaqus"]
 
 Integers = NDArray[np.int64]
 
@@ -109,7 +109,7 @@ def _node_sets(mesh: WrittenMesh, pairs: PeriodicPairs | None) -> Iterator[tuple
 
 
 def set_name_of(name: str) -> str:
-    """Name of a region or a face as Abaqus takes it: of letters, digits and underscores.
+    """Name of a region or a face as Abaqus and ANSYS take it: of letters, digits and underscores.
 
     >>> set_name_of("fluid-a/face 1"), set_name_of("a:1"), set_name_of("FACE_A")
     ('fluid_a_face_1', 'a_1', 'FACE_A')

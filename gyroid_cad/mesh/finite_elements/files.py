@@ -24,7 +24,7 @@ from gyroid_cad.common.formats import (
 )
 from gyroid_cad.common.progress import Progress, timed
 from gyroid_cad.errors import ParameterError
-from gyroid_cad.mesh.finite_elements.abaqus import abaqus_name, write_abaqus
+from gyroid_cad.mesh.finite_elements.abaqus import abaqus_name, set_name_of, write_abaqus
 from gyroid_cad.mesh.finite_elements.data import WrittenMesh, members
 from gyroid_cad.mesh.finite_elements.periodic import PeriodicPairs
 
@@ -116,9 +116,9 @@ def _write_ansys(mesh: WrittenMesh, path: Path) -> None:
         raise ParameterError("order", mesh.element.order, "1 for the mid-surface in .cdb files")
     grid = pyvista.UnstructuredGrid({vtk_type: mesh.cells}, mesh.points)
     for name, nodes in mesh.node_sets().items():
-        grid.point_data[name] = members(nodes, len(mesh.points))
-    for name, elements in mesh.element_sets().items():
-        grid.cell_data[name] = members(elements, len(mesh.cells))
+        grid.point_data[set_name_of(name)] = members(nodes, len(mesh.points))
+    for name, elements in {**mesh.regions(), **mesh.element_sets()}.items():
+        grid.cell_data[set_name_of(name)] = members(elements, len(mesh.cells))
     for name in ("ansys_material_type", "ansys_real_constant"):
         grid.cell_data[name] = np.ones(len(mesh.cells), dtype=np.int32)
     mapdl_archive.save_as_archive(str(path), grid)

@@ -141,13 +141,14 @@ class TetrahedralMesh:
     def write(self, *paths: str | os.PathLike[str], progress: Progress | None = None) -> None:
         """Write files; each path's ending chooses the program. A file appears whole or not at all.
 
-        Regions and named faces are physical groups in Gmsh files, sets and surfaces in Abaqus files, an array
-        "region" and arrays of nodes in VTU files, and property numbers in NASTRAN files, which know no more.
+        Regions and named faces are physical groups in Gmsh files, sets and surfaces in Abaqus files, components in
+        ANSYS files, an array "region" and arrays of nodes in VTU files, and property numbers in NASTRAN files, which
+        know no more.
 
         Parameters
         ----------
         *paths : path-like
-            Ending in .vtu, .msh, .inp, .bdf or .nas. All are checked before any is written.
+            Ending in .vtu, .msh, .inp, .cdb, .bdf or .nas. All are checked before any is written.
         progress : callable, optional
             Called with (stage, done, total).
 

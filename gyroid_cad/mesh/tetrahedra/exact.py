@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +21,18 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 # Of rows of points, and panels that each of these lies on.
 PanelPairs = tuple[Integers, Integers]
+# From points (n, 1, 3) and pieces (n, k) to weights (n, k, ...) of the nearest places, and how far off these are.
+Closest = Callable[[Floats, Integers], tuple[Floats, Floats]]
 
-# Fine triangles looked at for each point, and pieces of a crease.
-_NEAREST, _NEAREST_PIECES = 10, 6
+# Fine triangles, or pieces of a crease, looked at for each point at first, and at most.
+_NEAREST, _MOST_NEAREST = 8, 2000
+# In parts of the longest fine side: so close is a place that is the nearest.
+_CLOSE = 0.05
 _ROUNDS = 12
 # Of parameters' ranges, for derivatives; rounds towards the foot on a face, and towards where panels meet.
 _STEP, _FOOT_ROUNDS, _MEETING_ROUNDS = 1e-5, 2, 4
 # Squared sine of half the angle between panels that have no sure direction across their crease.
-_ALIKE = 1e-4
+_ALIKE = 3e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,6 +136,7 @@ class ExactPanels:
         middles = mesh.points[mesh.triangles].mean(axis=1)
         self._trees = {panel: (tree_of(middles[own]), own) for panel, own in grouped(mesh.panels)}
         sides = sides_of(mesh)
+        self._reach = float(sides.lengths(mesh.points).max())
         creases, keys = sides.ends[sides.creases], sides.keys[sides.creases]
         self._creases = {
             key: (tree_of(mesh.points[creases[own]].mean(axis=1)), creases[own]) for key, own in grouped(keys)
@@ -144,13 +152,10 @@ class ExactPanels:
         found, vertices = np.empty_like(points), self._placed.mesh.points
         for key, rows in grouped(keys):
             tree, ends = self._creases[key]
-            near = tree.query(points[rows], min(_NEAREST_PIECES, len(ends)))[1].reshape(len(rows), -1)
-            start = vertices[ends[near, 0]]
-            chord = vertices[ends[near, 1]] - start
-            along = dot(points[rows][:, np.newaxis] - start, chord) / np.maximum(dot(chord, chord), 1e-300)
-            places = start + np.clip(along, 0, 1)[..., np.newaxis] * chord
-            best = np.linalg.norm(places - points[rows][:, np.newaxis], axis=-1).argmin(axis=1)
-            found[rows] = places[np.arange(len(rows)), best]
+            start = vertices[ends[:, 0]]
+            chord = vertices[ends[:, 1]] - start
+            near, part = self._nearest(tree, points[rows], partial(_along, start, chord))
+            found[rows] = start[near] + part * chord[near]
         return found
 
     def on_triangles(self, points: Floats, panels: Integers) -> tuple[Floats, Integers, Floats]:
@@ -159,14 +164,31 @@ class ExactPanels:
         triangle, weights = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
         for panel, rows in grouped(panels):
             tree, own = self._trees[panel]
-            near = own[tree.query(points[rows], min(_NEAREST, len(own)))[1].reshape(len(rows), -1)]
-            corners = mesh.points[mesh.triangles[near]]
-            part = _closest(points[rows][:, np.newaxis], corners)
-            away = np.sum(part[..., np.newaxis] * corners, axis=2) - points[rows][:, np.newaxis]
-            best = np.arange(len(rows)), np.linalg.norm(away, axis=-1).argmin(axis=1)
-            triangle[rows], weights[rows] = near[best], part[best]
+            corners = mesh.points[mesh.triangles[own]]
+            near, weights[rows] = self._nearest(tree, points[rows], partial(_closest, corners))
+            triangle[rows] = own[near]
         places = np.sum(weights[..., np.newaxis] * mesh.points[mesh.triangles[triangle]], axis=1)
         return places, triangle, weights
+
+    def _nearest(self, tree: Any, points: Floats, closest: Closest) -> tuple[Integers, Floats]:
+        """Nearest pieces of points, and the weights there: among those whose middles are nearest.
+
+        Where small pieces lie round a point, the middle of a large one that holds it is further away: more are looked
+        at where none of those comes close.
+        """
+        best, weights = np.empty(len(points), dtype=np.int64), np.empty((len(points), 0))
+        rows, count = np.arange(len(points)), _NEAREST
+        while len(rows):
+            near = tree.query(points[rows], min(count, tree.n))[1].reshape(len(rows), -1)
+            part, away = closest(points[rows][:, np.newaxis], near)
+            first = np.arange(len(rows)), away.argmin(axis=1)
+            if not weights.size:
+                weights = np.empty((len(points), part.shape[-1]))
+            best[rows], weights[rows] = near[first], part[first]
+            rows, count = rows[away[first] > _CLOSE * self._reach], 6 * count
+            if near.shape[1] == tree.n or count > _MOST_NEAREST:
+                break
+        return best, weights
 
     def exact(self, points: Floats, pairs: PanelPairs) -> Floats:
         """Places on all panels that each point is paired with, next to it.
@@ -218,8 +240,9 @@ class ExactPanels:
         return found, unit(normals), places
 
 
-def _closest(points: Floats, corners: Floats) -> Floats:
-    """Weights of the corners of triangles (..., 3, 3) at the places nearest to points (..., 3)."""
+def _closest(corners: Floats, points: Floats, own: Integers) -> tuple[Floats, Floats]:
+    """Weights at the places nearest to points (n, 1, 3) on triangles (m, 3, 3) of these (n, k), and how far off."""
+    corners = corners[own]
     a, b, c = np.moveaxis(corners, -2, 0)
     ab, ac, away = b - a, c - a, points - a
     aa, bb, cc, x, y = dot(ab, ab), dot(ab, ac), dot(ac, ac), dot(away, ab), dot(away, ac)
@@ -236,4 +259,13 @@ def _closest(points: Floats, corners: Floats) -> Floats:
         part = np.zeros_like(weights)
         part[..., first], part[..., second] = 1 - along, along
         weights = np.where(nearer[..., np.newaxis], part, weights)
-    return weights
+    off = np.sum(weights[..., np.newaxis] * corners, axis=-2) - points
+    return weights, np.linalg.norm(off, axis=-1)
+
+
+def _along(starts: Floats, chords: Floats, points: Floats, own: Integers) -> tuple[Floats, Floats]:
+    """Parts (n, k, 1) of chords (m, 3) at the places nearest to points (n, 1, 3), and how far off."""
+    start, chord = starts[own], chords[own]
+    part = np.clip(dot(points - start, chord) / np.maximum(dot(chord, chord), np.finfo(float).tiny), 0, 1)
+    part = part[..., np.newaxis]
+    return part, np.linalg.norm(start + part * chord - points, axis=-1)

@@ -30,14 +30,18 @@ _GROWTH, _NARROW = 0.3, 1.5
 _SMALLEST = 0.2
 _ROUNDS, _MORE_ROUNDS = 5, 3
 _PASSES = 30
+# Changes in parts of the vertices, so few that no further pass is worth its while.
+_FEW = 500
 # Cosines that the normal of a triangle may turn by: where a side is taken out or turned, or a vertex moved.
 _TURNS, _EXCHANGED, _MOVED = 0.6, 0.8, 0.7
 # Of triangles: what a change may leave, whatever was there.
 _FAIR, _GOOD = 0.3, 0.4
+# Of what quality they had, what triangles keep as vertices are put on the panels.
+_SLIM = 0.5
 # Of the way to the middle of what is round a vertex.
 _STEP = 0.7
 # Cosine of the angle between triangles that are all but folded on each other.
-_FOLDED = np.cos(np.radians(2.0))
+_FOLDED = np.cos(np.radians(0.5))
 
 
 def panels_round(mesh: SurfaceMesh, which: Integers) -> PanelPairs:
@@ -93,9 +97,15 @@ class Remeshing:
 
     def _round(self) -> None:
         self._resize()
-        for change, few in ((self._split, 0), (self._collapse, 500), (self._exchange, 500)):
+        # Slim triangles that are halved again and again stay slim: sides are turned in between.
+        for _ in range(_PASSES):
+            if not self._split():
+                break
+            self._exchange()
+            self._exchange()
+        for change in (self._collapse, self._exchange):
             for _ in range(_PASSES):
-                if change() < 1 + (len(self.mesh.points) // few if few else 0):
+                if change() < 1 + len(self.mesh.points) // _FEW:
                     break
         self._smooth()
         self._smooth()
@@ -160,7 +170,15 @@ class Remeshing:
         self._sizes = np.concatenate([self._sizes, self._sizes[chosen].mean(axis=1)])
         self._fixed = np.concatenate([self._fixed, np.zeros(len(chosen), dtype=bool)])
         mesh = SurfaceMesh(points, triangles, panels)
-        self.mesh = SurfaceMesh(self._snapped(np.arange(first, len(points)), mesh), triangles, panels)
+        placed = self._snapped(np.arange(first, len(points)), mesh)
+        # Beside a crease that bends inwards the nearest place may be on it, and the triangles there flat.
+        made = triangles[kept.sum() :]
+        straight = unit(triangle_normals(points, made))
+        turned = np.sum(unit(triangle_normals(placed, made)) * straight, axis=1) < _TURNS
+        bad = turned | (triangle_quality(placed, made) < _SLIM * triangle_quality(points, made))
+        back = made[bad][made[bad] >= first]
+        placed[back] = points[back]
+        self.mesh = SurfaceMesh(placed, triangles, panels)
         return len(chosen)
 
     def _collapse(self) -> int:
@@ -285,7 +303,7 @@ class Remeshing:
         total = points[ends].mean(axis=1)
         for end in (0, 1):
             np.add.at(middle, ends[:, end], np.column_stack([weight[:, np.newaxis] * total, weight]))
-        return np.asarray(middle[:, :3] / middle[:, 3:])
+        return np.asarray(middle[:, :3] / np.maximum(middle[:, 3:], np.finfo(float).tiny))
 
 
 def narrow_places(mesh: SurfaceMesh) -> tuple[Floats, Floats]:

@@ -9,6 +9,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 from gyroid_cad.builds.meshes import LatticeMeshes
+from gyroid_cad.builds.properties import LatticeProperties
 from gyroid_cad.builds.report import LatticeReport, report_of
 from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number
@@ -45,7 +46,7 @@ __all__ = ["Lattice", "LatticeReport", "MapLike"]
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice(LatticeParameters, LatticeMeshes, HostShapes):
+class Lattice(LatticeParameters, LatticeMeshes, LatticeProperties, HostShapes):
     """A block of cells of the gyroid or another surface: alike, or with walls, cells and space that vary.
 
     The block of cells stands on the origin, [0, nx L] x [0, ny L] x [0, nz L]; as in the paper, patches

@@ -75,6 +75,7 @@ _MODULES = {
     "build": "build",
     "fill": "fill",
     "design": "design",
+    "properties": "properties",
     "mesh": "mesh",
     "volumes": "mesh",
     "view": "view",

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from typing import Any
 
 import click
 
 from gyroid_cad.cli.console import print_table
-from gyroid_cad.cli.lattice_options import TARGET_OPTIONS
+from gyroid_cad.cli.lattice_options import quantity_options
 from gyroid_cad.cli.options import json_option, printer_option
 from gyroid_cad.common.choices import SURFACE_NAMES, Kind, SurfaceName
 from gyroid_cad.errors import ParameterError
@@ -33,24 +32,8 @@ _ROWS = (
 )
 
 
-def _quantities(function: Callable[..., None]) -> Callable[..., None]:
-    """Give the command an option for each quantity, as one number."""
-    own = [
-        click.option(f"--{name}", type=float, metavar=unit, help=meaning)
-        for name, unit, meaning in (
-            ("cell-size", "MM", "Period of the cubic cell."),
-            ("thickness", "MM", "Whole wall."),
-            ("density", "RHO", "Solid part of the volume."),
-            ("porosity", "P", "Empty part of the volume: 1 - density."),
-        )
-    ]
-    for option in reversed((*own, *TARGET_OPTIONS)):
-        function = option(function)
-    return function
-
-
 @click.command("design")
-@_quantities
+@quantity_options
 @printer_option("By whose limits walls and throats are looked at: one that is known, or a TOML file.", "form2")
 @json_option
 def design_command(printer: str, as_json: bool, **given: Any) -> None:

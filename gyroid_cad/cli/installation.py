@@ -37,12 +37,14 @@ OPTIONAL = {
     "vtk": "tells inside from outside of parts, and measures walls in print-check",
     "matplotlib": "draws histograms: mesh --histogram",
     "mapdl-archive": "writes ANSYS .cdb files",
+    "scikit-fem": "finds effective properties",
 }
 # How those are installed that are an extra of ours.
 _REMEDIES = {
     "cadquery": MissingHostError("cadquery").remedy,
     "build123d": MissingHostError("build123d").remedy,
     "mapdl-archive": 'pip install "gyroid_cad[ansys]"',
+    "scikit-fem": 'pip install "gyroid_cad[analysis]"',
 }
 PROGRAMS = {"ccx": "CalculiX: solves the .inp files that mesh writes"}
 # The kernel's Python wheels: with and without VTK.

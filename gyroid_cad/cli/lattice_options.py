@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PAPER_OPTIONS",
-    "TARGET_OPTIONS",
     "described_by",
     "fit_of",
     "infill_options",
@@ -30,6 +29,7 @@ __all__ = [
     "listed",
     "options_given",
     "printed_options",
+    "quantity_options",
     "require_given",
     "take_defaults",
 ]
@@ -116,7 +116,7 @@ porosity_option = click.option(
     "--porosity", metavar="P", help="Empty part of the volume instead: 1 - density; may be an expression too."
 )
 # Two of these, and of cell size, thickness and density, describe a lattice that is uniform.
-TARGET_OPTIONS = tuple(
+_TARGET_OPTIONS = tuple(
     click.option(name, type=float, metavar=unit, help=meaning)
     for name, unit, meaning in (
         ("--pore-size", "MM", "Diameter of the largest sphere in the pores. Any two of these describe a lattice."),
@@ -142,7 +142,7 @@ _INFILL_OPTIONS = (
         help="Volume fraction instead of thickness, below 0.94033; may be an expression too.",
     ),
     porosity_option,
-    *TARGET_OPTIONS,
+    *_TARGET_OPTIONS,
     click.option(
         "--scale-field",
         metavar="EXPRESSION",
@@ -232,6 +232,22 @@ _outside_option = click.option(
     is_eager=True,
     help="Let a TOML file name files to be written that are not in its own folder.",
 )
+
+
+def quantity_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the quantities that describe a lattice which is alike throughout, each as one number."""
+    own = [
+        click.option(f"--{name}", type=float, metavar=unit, help=meaning)
+        for name, unit, meaning in (
+            ("cell-size", "MM", "Period of the cubic cell."),
+            ("thickness", "MM", "Whole wall."),
+            ("density", "RHO", "Solid part of the volume."),
+            ("porosity", "P", "Empty part of the volume: 1 - density."),
+        )
+    ]
+    for option in reversed((*own, *_TARGET_OPTIONS)):
+        function = option(function)
+    return function
 
 
 def infill_options(function: Callable[..., None]) -> Callable[..., None]:

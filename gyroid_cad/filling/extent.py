@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gyroid_cad.common.memory import require_room
+from gyroid_cad.common.processes import processors
 from gyroid_cad.errors import ParameterError
 from gyroid_cad.kernel.part import Part
 from gyroid_cad.surface.symmetry import CELL_QUARTERS, placed_corners
@@ -44,7 +45,7 @@ class PartExtent:
 
     def clearance(self, points: Floats) -> Floats:
         """No more than the distance of points from the boundary, in mm; shape (n,)."""
-        return np.asarray(self._tree.query(points)[0]) - self._error
+        return np.asarray(self._tree.query(points, workers=processors())[0]) - self._error
 
     def contains(self, points: Floats) -> Booleans:
         """Mask of the points, shape (n, 3), that lie inside; shape (n,)."""

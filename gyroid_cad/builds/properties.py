@@ -1,7 +1,8 @@
 """Effective properties of a lattice: what a part of many cells does, by one periodic cell, and how closely it is known.
 
 Meshes of few elements are solved, and what finer ones would give is extrapolated (Richardson): along the patches from
-three to seven elements a side, as many as the fit has spans, and across the wall from two to three layers.
+three to seven elements a side (of the diamond's smaller ones from two to five), and across the wall from two to three
+layers.
 The two corrections are small and independent; both together are told as the error.
 """
 
@@ -31,8 +32,10 @@ __all__ = ["LatticeProperties", "Properties"]
 Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
-# Elements a side of a patch, and layers across the wall; with what power of their number the error falls.
-_COARSE, _FINE, _FEW_LAYERS, _MORE_LAYERS = 3, 7, 2, 3
+# Elements a side of a patch, few and more: of cells of so many patches, and of those of more and smaller ones.
+_PATCHES, _SIDES, _SIDES_OF_SMALL_ONES = 24, (3, 7), (2, 5)
+# Layers across the wall; with what power of either number the error falls.
+_FEW_LAYERS, _MORE_LAYERS = 2, 3
 _ORDER = 4
 # Directions at which the stiffness is looked at, for where it is largest and smallest: of a hemisphere.
 _DIRECTIONS = 20_000
@@ -218,19 +221,20 @@ def _one_cell(spec: LatticeSpec) -> LatticeSpec:
 
 def _extrapolated(cell: LatticeSpec, poisson_ratio: float, progress: Progress | None) -> tuple[Floats, Floats, float]:
     """Extrapolate to meshes without end; the last number is by how much that differs from what was solved."""
-    meshes = ((_FINE, 1), (_COARSE, 1), (_COARSE, _FEW_LAYERS), (_COARSE, _MORE_LAYERS))
+    few, many = _SIDES if len(cell.grading.surface.cell) <= _PATCHES else _SIDES_OF_SMALL_ONES
+    meshes = ((many, 1), (few, 1), (few, _FEW_LAYERS), (few, _MORE_LAYERS))
     solved = []
     for number, (subdivisions, layers) in enumerate(meshes):
         report_progress(progress, "solve", number, len(meshes))
         solved.append(_solved(cell, subdivisions, layers, poisson_ratio))
     report_progress(progress, "solve", len(meshes), len(meshes))
-    along = (_FINE / _COARSE) ** _ORDER - 1
+    along = (many / few) ** _ORDER - 1
     across = (_MORE_LAYERS / _FEW_LAYERS) ** _ORDER - 1
     results, errors = [], []
-    for fine, coarse, few, more in zip(*((one.stiffness, one.conductivity) for one in solved), strict=True):
-        further, thicker = (fine - coarse) / along, (more - few) / across
-        results.append(fine + further + (more - coarse) + thicker)
-        errors.append(float((np.abs(further) + np.abs(thicker)).max() / np.abs(results[-1]).max()))
+    for fine, coarse, thick, thin in zip(*((one.stiffness, one.conductivity) for one in solved), strict=True):
+        further, thinner = (fine - coarse) / along, (thin - thick) / across
+        results.append(fine + further + (thin - coarse) + thinner)
+        errors.append(float((np.abs(further) + np.abs(thinner)).max() / np.abs(results[-1]).max()))
     return results[0], results[1], max(errors)
 
 

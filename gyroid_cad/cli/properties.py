@@ -35,7 +35,7 @@ def properties_command(
 
     \b
     gyroid-cad properties --cell-size 10 --density 0.3 --youngs-modulus 110000 --poisson-ratio 0.34
-    gyroid-cad properties --pore-size 0.6 --porosity 0.75 --surface diamond --json
+    gyroid-cad properties --pore-size 0.6 --porosity 0.75 --surface primitive --json
     """
     start = time.perf_counter()
     lattice = Lattice((1, 1, 1), **given)

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
-_NEWTON_STEPS, _TURNING_STEPS = 40, 3
+_NEWTON_STEPS, _TURNING_STEPS = 40, 6
 # What a step of Newton's method leaves is its square; what one by bisection leaves is as long as itself.
 _CONVERGED, _SQUARED = 1e-14, 1e-9
 _ROUNDING = 1e-13

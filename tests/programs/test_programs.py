@@ -105,6 +105,19 @@ def test_freecad_opens_valid_solids_and_writes_them_anew(sample: Sample, tmp_pat
     assert volume == pytest.approx(sample.report.volume, rel=BY_KERNEL)
 
 
+# FreeCAD's check before Boolean operations takes a minute and more for what has hundreds of faces.
+@pytest.mark.parametrize("sample", ["filled"], indirect=True)
+def test_freecads_check_before_boolean_operations_finds_nothing(sample: Sample, tmp_path: Path) -> None:
+    freecad = program("freecadcmd", "FreeCADCmd", "freecad.cmd")
+    (tmp_path / "look.py").write_text(IN_FREECAD.replace("shape.check()", "shape.check(True)"))
+    text = said(
+        [freecad, tmp_path / "look.py"], GYROID_READ=str(sample.step), GYROID_WRITTEN=str(tmp_path / "again.step")
+    )
+    # What it finds it raises.
+    assert "FOUND" in text
+    assert "BOPAlgo" not in text
+
+
 def test_freecad_opens_an_assembly_as_one_cell_at_each_of_its_places(cell: Lattice, tmp_path: Path) -> None:
     lattice, step = replace(cell, cells=(2, 1, 1)), tmp_path / "assembly.step"
     lattice.write(step, instances=True)

@@ -14,10 +14,9 @@ import meshio
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, kron
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
-from skfem.helpers import ddot, sym_grad, trace
 from skfem.io.meshio import from_meshio
 
 from gyroid_cad.common.arrays import freeze_arrays
@@ -72,11 +71,12 @@ def homogenised(mesh: MeshData, pairs: PeriodicPairs, volume: float, poisson_rat
     EffectiveTensors
     """
     grid = from_meshio(meshio.Mesh(mesh.points, [("hexahedron27", mesh.cells)]))
-    scalar = skfem.Basis(grid, skfem.ElementHex2(), intorder=_RULE)
-    vector = scalar.with_element(skfem.ElementVector(skfem.ElementHex2()))
-    own = _masters(mesh, pairs)
-    stiffness = _stiffness(vector, _periodic(vector, mesh, own, 3), poisson_ratio) / volume
-    conductivity = _conductivity(scalar, _periodic(scalar, mesh, own, 1)) / volume
+    basis = skfem.Basis(grid, skfem.ElementHex2(), intorder=_RULE)
+    # The library numbers nodes its own way.
+    own = _masters(mesh, pairs)[cKDTree(mesh.points).query(basis.doflocs.T)[1]]
+    rates = _Rates(basis)
+    stiffness = _stiffness(rates, _periodic(own, 3), poisson_ratio) / volume
+    conductivity = _conductivity(rates, _periodic(own, 1)) / volume
     return EffectiveTensors((stiffness + stiffness.T) / 2, (conductivity + conductivity.T) / 2)
 
 
@@ -87,26 +87,38 @@ def _masters(mesh: MeshData, pairs: PeriodicPairs) -> Integers:
     return own
 
 
-def _periodic(basis: Any, mesh: MeshData, own: Integers, components: int) -> csr_array:
+def _periodic(own: Integers, components: int) -> csr_array:
     """Degrees of freedom from those that are their own in the endless lattice, without those of one node.
 
     That node stays where it is: what is periodic is known but for a shift.
     """
-    # The library numbers nodes its own way.
-    node = cKDTree(mesh.points).query(basis.doflocs.T)[1]
-    component = np.zeros(basis.N, dtype=np.int64)
-    for dofs in (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs):
-        component[dofs] = np.arange(components)[:, np.newaxis]
-    number = components * own[node] + component
+    number = (components * own[:, np.newaxis] + np.arange(components)).ravel()
     free, column = np.unique(number, return_inverse=True)
     held = free // components == free[0] // components
     kept = np.cumsum(~held) - 1
     rows = np.flatnonzero(~held[column])
-    shape = (basis.N, int((~held).sum()))
-    return csr_array((np.ones(len(rows)), (rows, kept[column[rows]])), shape=shape)
+    return csr_array((np.ones(len(rows)), (rows, kept[column[rows]])), shape=(len(number), int((~held).sum())))
 
 
-def _stiffness(basis: Any, periodic: csr_array, poisson_ratio: float) -> Floats:
+class _Rates:
+    """Integrals of products of two functions' rates of change, by pairs of axes, and of one function's; and the volume.
+
+    All energies are sums of these, which are assembled once.
+    """
+
+    def __init__(self, basis: Any) -> None:
+        def product(a: int, b: int) -> Any:
+            return skfem.BilinearForm(lambda u, v, _: v.grad[a] * u.grad[b]).assemble(basis)
+
+        self.products = {(a, b): product(a, b) for a in range(3) for b in range(a, 3)}
+        self.products |= {(b, a): matrix.T for (a, b), matrix in self.products.items() if a != b}
+        single = (skfem.LinearForm(lambda v, _, a=a: v.grad[a]).assemble(basis) for a in range(3))
+        self.single = np.array(list(single))
+        self.square = sum(self.products[a, a] for a in range(3))
+        self.volume = float(basis.dx.sum())
+
+
+def _stiffness(rates: _Rates, periodic: csr_array, poisson_ratio: float) -> Floats:
     first = poisson_ratio / (1 + poisson_ratio) / (1 - 2 * poisson_ratio)
     shear = 1 / 2 / (1 + poisson_ratio)
     strains = np.zeros((6, 3, 3))
@@ -114,29 +126,19 @@ def _stiffness(basis: Any, periodic: csr_array, poisson_ratio: float) -> Floats:
         strains[row, i, j] += 0.5
         strains[row, j, i] += 0.5
     stresses = 2 * shear * strains + first * np.einsum("aii,jk->ajk", strains, np.eye(3))
-
-    def energy(u: Any, v: Any, _: Any) -> Any:
-        strain = sym_grad(u)
-        return 2 * shear * ddot(strain, sym_grad(v)) + first * trace(strain) * trace(sym_grad(v))
-
-    def load(stress: Floats) -> Any:
-        return skfem.LinearForm(lambda v, _: -ddot(stress[:, :, None, None], sym_grad(v))).assemble(basis)
-
-    uniform = np.einsum("aij,bij->ab", stresses, strains) * float(basis.dx.sum())
-    loads = np.array([load(stress) for stress in stresses]).T
-    return _effective(skfem.BilinearForm(energy).assemble(basis), loads, periodic, uniform)
+    energy = kron(rates.square, shear * np.eye(3))
+    for (a, b), product in rates.products.items():
+        place = np.zeros((3, 3))
+        place[a, b] += first
+        place[b, a] += shear
+        energy = energy + kron(product, place)
+    loads = -np.einsum("kab,bn->nak", stresses, rates.single).reshape(-1, len(stresses))
+    uniform = np.einsum("aij,bij->ab", stresses, strains) * rates.volume
+    return _effective(energy, loads, periodic, uniform)
 
 
-def _conductivity(basis: Any, periodic: csr_array) -> Floats:
-    def energy(u: Any, v: Any, _: Any) -> Any:
-        return np.sum(u.grad * v.grad, axis=0)
-
-    def load(axis: int) -> Any:
-        return skfem.LinearForm(lambda v, _: -v.grad[axis]).assemble(basis)
-
-    loads = np.array([load(axis) for axis in range(3)]).T
-    uniform = np.eye(3) * float(basis.dx.sum())
-    return _effective(skfem.BilinearForm(energy).assemble(basis), loads, periodic, uniform)
+def _conductivity(rates: _Rates, periodic: csr_array) -> Floats:
+    return _effective(rates.square, -rates.single.T, periodic, np.eye(3) * rates.volume)
 
 
 def _effective(energy: Any, loads: Floats, periodic: csr_array, uniform: Floats) -> Floats:

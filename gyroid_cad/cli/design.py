@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import click
@@ -58,7 +59,7 @@ def design_command(printer: str, as_json: bool, **given: Any) -> None:
                 found[surface, kind] = refused
     made = [one for one in found.values() if isinstance(one, Design)]
     if not made:
-        raise next(one for one in found.values() if isinstance(one, ParameterError))
+        raise _joint([(key, one) for key, one in found.items() if isinstance(one, ParameterError)])
     if as_json:
         click.echo(json.dumps([_as_dict(key, one, limits) for key, one in found.items()]))
         return
@@ -69,6 +70,16 @@ def design_command(printer: str, as_json: bool, **given: Any) -> None:
     for (surface, kind), one in found.items():
         if isinstance(one, ParameterError):
             click.echo(f"{surface} {kind}: none: {one}")
+
+
+def _joint(refused: Sequence[tuple[tuple[SurfaceName, Kind], ParameterError]]) -> ParameterError:
+    """One error of all lattices: what each accepts, unless all say the same."""
+    first = refused[0][1]
+    said = [(f"{surface} {kind}", one) for (surface, kind), one in refused if one.parameter == first.parameter]
+    if len({one.accepted for _, one in said}) == 1:
+        return first
+    accepted = "; ".join(f"{name}: {one.accepted}" for name, one in said)
+    return ParameterError(first.parameter, first.value, accepted)
 
 
 def _shown(value: float | None, unit: str) -> str:

@@ -240,6 +240,8 @@ class Filled(HostShapes):
         targets, limit = require_formats(paths, (*PART_FORMATS, *MESH_FORMATS)), self.deviation(deviation)
         meshes = [require_mesh_format(path) for path in targets if format_of(path) in MESH_FORMATS]
         require_elements(element_size, elements_through, order, bool(meshes))
+        if meshes:
+            element_length(element_size, elements_through, self.report.min_wall, self.report.cell_size)
         header = StepHeader(schema, author, organisation, pcurves, products)
         require_settings((1, 1, 1), limit, angle)
         require_regions(self.report.kind, targets, regions)

@@ -43,8 +43,8 @@ class FluidReport:
     hydraulic_diameter : float
         Four times the volume by the wetted area, in mm.
     pieces, dead_ends : int
-        Not connected to each other, and those of them that have no second mouth to flow out by; in a skin, that come to
-        no second opening.
+        Not connected to each other, and those of them that cannot be flowed through: in a skin, that come to no second
+        opening; in a part without one, whose mouths join over its edges, that have no mouth.
     throat : float
         Diameter of the largest sphere that passes between all openings of the fluid, in mm, to about a twentieth of a
         cell, 0 where it is no wider; without a skin that has two the lattice's own, which is exact where the wall is

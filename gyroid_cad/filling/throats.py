@@ -190,7 +190,9 @@ def fluid_of(name: str, made: Sequence[Made], filling: FilledBy, outcome: Outcom
     """Report on the bodies of a fluid, by its name, once a part has been filled."""
     volume, wetted = (sum(getattr(one, of) for one in made) for of in ("volume", "wetted"))
     region = next(region for region in filling.regions if region.name == name)
-    dead_ends = sum(mouths_of(one) < 2 for one in made)
+    # Mouths in the bare sides of a part join over its edges: one may lead out on all of them.
+    least = 1 if filling.hollow is None else 2
+    dead_ends = sum(mouths_of(one) < least for one in made)
     with filling.timed("throats"):
         throat = narrowest_throat(filling.of(name), outcome.infill, region)
     return fluid_report(name, volume, wetted, len(made), dead_ends, throat)

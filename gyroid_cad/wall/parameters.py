@@ -335,15 +335,17 @@ class LatticeParameters:
     def _take_targets(self) -> None:
         """Put cell size and wall in the place of what describes them otherwise."""
         targets = {name: getattr(self, name) for name in TARGETS}
-        if any(value is not None for value in targets.values()):
+        named = [name for name, value in targets.items() if value is not None]
+        if (self.scale_field is not None or self.map is not None) and named not in ([], ["porosity"]):
+            name = next(name for name in named if name != "porosity")
+            raise ParameterError(name, targets[name], "none where a scale field or a map lets cells vary")
+        if named:
             # What is needed to solve for them takes longer to load than a cell to build.
             from gyroid_cad.wall.laws import wall_from
 
             own = wall_from(self.surface, self.kind, self.cell_size, self.thickness, self.density, targets)
-            for name, value in (
-                *zip(("cell_size", "thickness", "density"), own, strict=True),
-                *dict.fromkeys(TARGETS).items(),
-            ):
+            found = dict(zip(("cell_size", "thickness", "density"), own, strict=True)) | dict.fromkeys(TARGETS)
+            for name, value in found.items():
                 object.__setattr__(self, name, value)
 
     def _require_variable(self) -> None:

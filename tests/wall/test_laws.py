@@ -12,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gyroid_cad import Design, Lattice, ParameterError, design
+from gyroid_cad.cli.app import main
 from gyroid_cad.common.choices import SURFACE_NAMES, Kind, SurfaceName
 from gyroid_cad.nurbs.basis import gauss_points
 from gyroid_cad.report.pores import inscribed_spheres
@@ -172,6 +173,21 @@ def test_a_lattice_keeps_the_cell_and_the_wall_that_follow() -> None:
     assert network.cell_size == design(kind="network-a", pore_size=2.0, porosity=0.6).cell_size
     graded = Lattice((1, 1, 1), 10.0, porosity="0.7 + 0.001*x")
     assert graded.volume_fraction == pytest.approx(Lattice((1, 1, 1), 10.0, density="0.3 - 0.001*x").volume_fraction)
+
+
+def test_pores_that_would_vary_with_the_cells_are_refused() -> None:
+    with pytest.raises(ParameterError, match=r"pore_size = 3.*: expected none where a scale field or a map"):
+        Lattice((1, 1, 1), pore_size=3.0, porosity=0.75, scale_field="1 + 0.01*x")
+    assert Lattice((1, 1, 1), 10.0, porosity=0.75, scale_field="1 + 0.01*x").density == 0.25
+
+
+def test_where_no_lattice_has_both_each_says_what_it_would_take(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["design", "--area-per-volume", "0.9", "--cell-size", "10"]) == 2
+    said = capsys.readouterr().err
+    for name in ("gyroid sheet: above", "diamond sheet: above", "primitive network-a: above"):
+        assert name in said
+    assert main(["design", "--area-per-volume", "-1", "--cell-size", "10"]) == 2
+    assert capsys.readouterr().err.count("above 0") == 1
 
 
 @pytest.mark.parametrize("beside", [{"thickness": 0.8}, {"density": 0.3}])

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gyroid_cad.common.choices import TARGETS
 from gyroid_cad.common.doors import key_of
 from gyroid_cad.errors import GyroidError, ParameterError
 
@@ -35,7 +36,7 @@ __all__ = [
 FAILED, BAD_USAGE, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
 _CONFIG = "gyroid_cad.config"
 # What a parameter may have been reckoned from.
-_GIVEN_AS = {"density": "porosity"}
+_GIVEN_AS = {"density": TARGETS, "thickness": TARGETS, "cell_size": TARGETS}
 _MEMORY = "memory gave out: it takes fewer cells, coarser triangles, or more memory for this process"
 _UNWRITTEN = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EBADF)
 # What the system says, in an ImportError, when a library finds no room.
@@ -109,9 +110,9 @@ def label(context: click.Context | None, parameter: str) -> str:
     config = config_of(context)
     if isinstance(option, click.Argument):
         return config.place(parameter) if config is not None and parameter in config.values else parameter
-    other = _GIVEN_AS.get(parameter)
-    if context.params.get(parameter) is None and other is not None and context.params.get(other) is not None:
-        return f"{label(context, other)}: {parameter}"
+    others = [other for other in _GIVEN_AS.get(parameter, ()) if context.params.get(other) is not None]
+    if context.params.get(parameter) is None and others:
+        return f"{', '.join(label(context, other) for other in others)}: {parameter}"
     if context.get_parameter_source(parameter) == click.core.ParameterSource.DEFAULT_MAP:
         assert config is not None
         return config.place(parameter)

@@ -190,6 +190,12 @@ def test_where_no_lattice_has_both_each_says_what_it_would_take(capsys: pytest.C
     assert capsys.readouterr().err.count("above 0") == 1
 
 
+def test_a_cell_that_follows_and_is_too_small_is_told_by_what_was_given(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--cells", "1", "1", "1", "--pore-size", "1e-4", "--porosity", "0.7"]
+    assert main(["build", "-o", "a.step", *asked]) == 2
+    assert "--porosity, --pore-size: cell_size = 0.0002" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("beside", [{"thickness": 0.8}, {"density": 0.3}])
 def test_a_porosity_stands_alone(beside: dict[str, float]) -> None:
     with pytest.raises(ParameterError, match=r"porosity = 0\.7: expected none beside"):

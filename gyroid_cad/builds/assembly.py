@@ -85,7 +85,21 @@ class Assembly:
         thickness, density, volume_exact : float
             Of the exact lattice.
         """
-        return _report(self, thickness, density, volume_exact)
+        count = prod(self.cells)
+        return AssemblyReport(
+            cells=self.cells,
+            cell_size=self.cell_size,
+            thickness=thickness,
+            density=density,
+            instances=count,
+            faces=self.cell.topology.faces,
+            valid=self.cell.valid(),
+            closed=self.cell.topology.closed,
+            volume=count * self.cell.volume,
+            volume_exact=volume_exact,
+            area=count * self.cell.area(),
+            seconds=dict(self.cell.seconds),
+        )
 
     def write(
         self,
@@ -208,21 +222,3 @@ def assembly(spec: LatticeSpec, progress: Progress | None = None) -> Assembly:
         )
     one = build(replace(spec, cells=(1, 1, 1)), progress)
     return Assembly(spec.cells, spec.grading.cell_size, one)
-
-
-def _report(made: Assembly, thickness: float, density: float, volume_exact: float) -> AssemblyReport:
-    count = prod(made.cells)
-    return AssemblyReport(
-        cells=made.cells,
-        cell_size=made.cell_size,
-        thickness=thickness,
-        density=density,
-        instances=count,
-        faces=made.cell.topology.faces,
-        valid=made.cell.valid(),
-        closed=made.cell.topology.closed,
-        volume=count * made.cell.volume,
-        volume_exact=volume_exact,
-        area=count * made.cell.area(),
-        seconds=dict(made.cell.seconds),
-    )

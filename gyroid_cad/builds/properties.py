@@ -2,8 +2,7 @@
 
 Meshes of few elements are solved, and what finer ones would give is extrapolated (Richardson): along the patches from
 three to seven elements a side (of the diamond's smaller ones from two to five), and across the wall from two to three
-layers.
-The two corrections are small and independent; both together are told as the error.
+layers. The two corrections are small and independent; both together are told as the error.
 """
 
 from __future__ import annotations
@@ -16,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gyroid_cad.builds.meshes import hexahedral_mesh
+from gyroid_cad.common.arrays import Point
 from gyroid_cad.common.checks import finite_number, positive_number
 from gyroid_cad.common.choices import Kind
 from gyroid_cad.common.progress import Progress, report_progress
+from gyroid_cad.common.verdicts import as_point
 from gyroid_cad.errors import GyroidError, ParameterError
 from gyroid_cad.mesh.finite_elements.periodic import periodic_pairs
 from gyroid_cad.wall.fitted import LatticeSpec, fitted_wall
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["LatticeProperties", "Properties"]
 
 Floats = NDArray[np.float64]
-Vector = tuple[float, float, float]
 
 # Elements a side of a patch, few and more: of cells of so many patches, and of those of more and smaller ones.
 _PATCHES, _SIDES, _SIDES_OF_SMALL_ONES = 24, (3, 7), (2, 5)
@@ -80,13 +80,13 @@ class Properties:
     poisson_ratio: float
     conductivity: float
     stiffness: tuple[tuple[float, ...], ...]
-    moduli: Vector
-    shear_moduli: Vector
+    moduli: Point
+    shear_moduli: Point
     relative_modulus: float
     lateral_ratio: float
     zener_ratio: float
-    stiffest: tuple[float, Vector]
-    softest: tuple[float, Vector]
+    stiffest: tuple[float, Point]
+    softest: tuple[float, Point]
     effective_conductivity: tuple[tuple[float, ...], ...]
     error: float
 
@@ -112,7 +112,7 @@ class Properties:
         ]
 
 
-def _directed(modulus: float, way: Vector) -> str:
+def _directed(modulus: float, way: Point) -> str:
     return f"{modulus:.5g} along ({', '.join(f'{part:.2f}' for part in way)})"
 
 
@@ -142,8 +142,8 @@ def _effective_properties(
         lateral,
         carried,
         _rows(stiffness),
-        _vector(moduli),
-        _vector(shears),
+        as_point(moduli),
+        as_point(shears),
         float(moduli[0] / modulus),
         float(-compliance[0, 1] / compliance[0, 0]),
         float(2 * stiffness[3, 3] / (stiffness[0, 0] - stiffness[0, 1])),
@@ -249,7 +249,7 @@ def _solved(cell: LatticeSpec, subdivisions: int, layers: int, poisson_ratio: fl
     return homogenised(mesh, periodic_pairs(mesh, size), size**3, poisson_ratio)
 
 
-def _extremes(compliance: Floats) -> tuple[tuple[float, Vector], tuple[float, Vector]]:
+def _extremes(compliance: Floats) -> tuple[tuple[float, Point], tuple[float, Point]]:
     """Largest and smallest Young's modulus, and directions that have them; by a spiral over half the sphere."""
     z = 1 - (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
     turn = np.pi * (1 + np.sqrt(5)) * np.arange(_DIRECTIONS)
@@ -263,12 +263,7 @@ def _extremes(compliance: Floats) -> tuple[tuple[float, Vector], tuple[float, Ve
     stress = np.stack([x * x, y * y, z * z, y * z, x * z, x * y])
     moduli = 1 / np.einsum("im,ij,jm->m", stress, compliance, stress)
     first, last = (int(np.argmax(np.round(sign * moduli / moduli.max(), 6))) for sign in (1, -1))
-    return (float(moduli[first]), _vector(ways[first])), (float(moduli[last]), _vector(ways[last]))
-
-
-def _vector(parts: Floats) -> Vector:
-    x, y, z = parts.tolist()
-    return x, y, z
+    return (float(moduli[first]), as_point(ways[first])), (float(moduli[last]), as_point(ways[last]))
 
 
 def _rows(matrix: Floats) -> tuple[tuple[float, ...], ...]:

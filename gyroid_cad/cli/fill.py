@@ -29,7 +29,7 @@ from gyroid_cad.cli.options import (
     deviation_option,
     file_paths,
     json_option,
-    one_of,
+    order_option,
     output_option,
     printer_option,
     quiet_option,
@@ -161,15 +161,7 @@ def _take_files(context: click.Context, parameter: click.Parameter, files: tuple
     metavar="N",
     help="Instead, how many tetrahedra there are through the wall, about; 2 if neither is given.",
 )
-@click.option(
-    "--order",
-    type=int,
-    default=1,
-    show_default=True,
-    metavar="1|2",
-    shell_complete=one_of("1", "2"),
-    help="Tetrahedra of 4 nodes, or of 10 that follow the faces.",
-)
+@order_option("Tetrahedra of 4 nodes, or of 10 that follow the faces.")
 @check_option
 @printer_option("Check as well whether it can make this, such as form2.")
 @click.option("--print-config", is_flag=True, help="Print all of this as TOML, ready for FILL.toml; fill nothing.")
@@ -230,9 +222,10 @@ def fill_command(
             filled = fill.fill(part, progress=progress, **settings)
         except KernelError as failed:
             raise KernelError(str(failed).replace('route="triangles"', "--route triangles")) from failed
+        # What can fail comes before the first file.
+        mesh = filled.mesh(**elements, progress=progress) if meshes else None
         if others := [path for path in output if path not in meshes]:
             filled.write(*others, **written, progress=progress)
-        mesh = filled.mesh(**elements, progress=progress) if meshes else None
         if mesh is not None:
             mesh.write(*meshes, progress=progress)
         check = None if checked is None else checked(filled, given["deviation"], progress)

@@ -11,7 +11,7 @@ import click
 
 from gyroid_cad.cli.console import print_report, print_table, shown_progress
 from gyroid_cad.cli.lattice_options import lattice_of, lattice_options
-from gyroid_cad.cli.options import json_option, one_of, output_option, quiet_option
+from gyroid_cad.cli.options import json_option, one_of, order_option, output_option, quiet_option
 from gyroid_cad.common.files import file_sizes, require_distinct
 from gyroid_cad.common.formats import MESH_FORMATS, VOLUME_FORMATS, listed_formats, require_formats
 from gyroid_cad.common.progress import timed
@@ -33,15 +33,7 @@ __all__ = ["mesh_command", "volumes_command"]
     metavar="M",
     help="Of hexahedra across the wall; 0 for quadrilaterals of the mid-surface.",
 )
-@click.option(
-    "--order",
-    type=int,
-    default=1,
-    show_default=True,
-    metavar="1|2",
-    shell_complete=one_of("1", "2"),
-    help="Linear or quadratic elements.",
-)
+@order_option("Linear or quadratic elements.")
 @click.option("--full", is_flag=True, help="Quadratic hexahedra of 27 nodes instead of 20, quadrilaterals of 9 not 8.")
 @click.option("--quality", is_flag=True, help="Measure every element, as Verdict defines the measures.")
 @click.option("--histogram", metavar="FILE.png", help="Draw the measures' histograms; needs matplotlib.")

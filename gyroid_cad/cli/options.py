@@ -20,6 +20,7 @@ __all__ = [
     "file_paths",
     "json_option",
     "one_of",
+    "order_option",
     "output_option",
     "printer_option",
     "quiet_option",
@@ -73,6 +74,19 @@ def output_option(endings: str, required: bool = False) -> Decorator:
     """Declare ``-o``, for files with these endings."""
     return click.option(
         "-o", "--output", multiple=True, metavar="FILE", shell_complete=file_paths, help=endings, required=required
+    )
+
+
+def order_option(help: str) -> Decorator:
+    """Declare ``--order``, of elements."""
+    return click.option(
+        "--order",
+        type=int,
+        default=1,
+        show_default=True,
+        metavar="1|2",
+        shell_complete=one_of("1", "2"),
+        help=help,
     )
 
 

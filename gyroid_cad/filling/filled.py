@@ -240,8 +240,6 @@ class Filled(HostShapes):
         targets, limit = require_formats(paths, (*PART_FORMATS, *MESH_FORMATS)), self.deviation(deviation)
         meshes = [require_mesh_format(path) for path in targets if format_of(path) in MESH_FORMATS]
         require_elements(element_size, elements_through, order, bool(meshes))
-        if meshes:
-            element_length(element_size, elements_through, self.report.min_wall, self.report.cell_size)
         header = StepHeader(schema, author, organisation, pcurves, products)
         require_settings((1, 1, 1), limit, angle)
         require_regions(self.report.kind, targets, regions)
@@ -251,6 +249,8 @@ class Filled(HostShapes):
             if not self.report.closed:
                 raise ParameterError("output", str(path), "STEP or BREP: the bare surface bounds no volume to print")
             require_near_origin(path, corners_of(box_round(self.domains.values())), limit)
+        # What can fail comes before the first file.
+        mesh = self.mesh(element_size, elements_through, order, progress) if meshes else None
         sizes = [size for name in self.domains for size in self.sizes[name]]
         labels = self._labels()
         for path in (path for path in targets if path not in meshes):
@@ -259,8 +259,8 @@ class Filled(HostShapes):
                     self._write_regions(path, regions, limit, angle)
                 else:
                     write_shape(self.solid(), sizes, path, header, limit, angle, labels)
-        if meshes:
-            self.mesh(element_size, elements_through, order, progress).write(*meshes, progress=progress)
+        if mesh is not None:
+            mesh.write(*meshes, progress=progress)
 
     def _write_regions(self, path: Path, body: BodyName, deviation: float, angle: float) -> None:
         made = triangles_of_bodies(self.domains.values(), path, deviation, angle)

@@ -377,3 +377,14 @@ def test_the_part_itself_is_not_overwritten(capsys: Captured, block: Path, tmp_p
         assert done.status == 2
         assert "expected another file than the part that is filled" in done.err
     assert block.read_bytes() == before
+
+
+def test_a_mesh_that_cannot_be_made_leaves_no_other_file_of_its_call(
+    capsys: Captured, block: Path, tmp_path: Path
+) -> None:
+    before = sorted(tmp_path.iterdir())
+    given = ("--cell-size", "8", "--density", "0.3", "--control-points", "5", "--element-size", "100")
+    done = run(capsys, block, "-o", tmp_path / "made.step", "-o", tmp_path / "made.msh", *given)
+    assert done.status == 2
+    assert "--element-size = 100.0: expected at most the cell size, 8 mm" in done.err
+    assert sorted(tmp_path.iterdir()) == before
